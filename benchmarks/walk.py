@@ -4,8 +4,8 @@
     python -m benchmarks.walk ../shared/data/pendulum_torque
 
 The first line makes the pictures of docs/workbench.md: a Feetech STS3215 under firmware gain 16 with 0.97 kg at 0.1 m,
-ten runs of time, goal and position (kscalelabs/sysid; not committed). The second one takes torques of a pendulum
-(lvjonok/mujoco-sysid). An action is a click, or a field that is typed or chosen. Needs Playwright and Chromium.
+six runs of time, goal and position (kscalelabs/sysid; not committed). The second line takes a pendulum
+under torques (lvjonok/mujoco-sysid). An action is a click, or a field typed or chosen. Needs Playwright and Chromium.
 """
 
 import argparse
@@ -21,6 +21,7 @@ from playwright.sync_api import Locator, Page
 from benchmarks.browser import processor_seconds, workbench
 
 CONDITION = {"kp": 16, "mass": 0.969, "length": 0.1}
+MOTIONS = ("brutal", "sin_sin", "up_and_down")
 COLORS = 48  # of a picture: lines and text need few
 DROP = """(files) => { const data = new DataTransfer();
 for (const [name, text] of files) data.items.add(new File([text], name)); return data; }"""
@@ -28,9 +29,10 @@ Logs = list[tuple[str, str]]
 
 
 def servo(folder: Path) -> Logs:
-    """Time, goal and position of all runs of one condition."""
+    """Time, goal and position of some runs of one condition."""
     columns = np.load(folder / "sts3215.npz")
     runs = [run for run in json.loads((folder / "runs.json").read_text()) if CONDITION.items() <= run.items()]
+    runs = [run for run in runs if run["trajectory"] in MOTIONS]
     return [
         (
             f"{run['trajectory']}_{run['run']}.csv",
@@ -77,14 +79,15 @@ class Walk:
         self.page.get_by_label(label).fill(text)
         self.actions += 1
 
-    def picture(self, name: str, top: Locator | None = None, height: int = 860) -> None:
+    def picture(self, name: str, top: Locator | None = None, height: float = 860.0) -> None:
         """The window, scrolled to a part, in few colours."""
         if self.out is None:
             return
         self.page.wait_for_timeout(1500)
-        y = 0.0 if top is None else top.bounding_box()["y"] + self.page.evaluate("scrollY") - 8
-        clip = {"x": 0, "y": y, "width": 1280, "height": height}
-        whole = Image.open(io.BytesIO(self.page.screenshot(full_page=True, clip=clip))).convert("RGB")
+        box = None if top is None else top.bounding_box()
+        y = box["y"] + self.page.evaluate("scrollY") - 8.0 if box else 0.0
+        shot = self.page.screenshot(full_page=True, clip={"x": 0.0, "y": y, "width": 1280.0, "height": height})
+        whole = Image.open(io.BytesIO(shot)).convert("RGB")
         whole.quantize(COLORS, dither=Image.Dither.NONE).save(self.out / f"workbench_{name}.png", optimize=True)
 
 
@@ -110,7 +113,7 @@ def main() -> None:
             walk.type("its firmware's gain", "16")
         else:
             walk.choose("commands are", "torque")
-        walk.picture("import", height=760)
+        walk.picture("import", height=760.0)
         walk.click("Import")
         page.get_by_role("radio").first.wait_for()
         say("imported, candidates ranked")

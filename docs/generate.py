@@ -155,8 +155,7 @@ def signatures(motions: tuple[str, ...]) -> dict[str, list[tuple[object, object,
     from tactile_cube.measurement.recordings.description import TrialEntry
     from tactile_cube.measurement.replay.model import Model, terms_of
     from tactile_cube.measurement.replay.simulator import Simulator
-    from tactile_cube.measurement.sources.session import silent_trial, unmeasured
-    from tactile_cube.measurement.sources.simulated_rig import SimulatedRig
+    from tactile_cube.measurement.sources.simulated_rig import SimulatedRig, silent_trial, unmeasured
 
     config = worded_job("record", ("source=finger", "out=unused")).config.source
     source = SimulatedRig(

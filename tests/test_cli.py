@@ -18,7 +18,6 @@ from tactile_cube.agent.networks import Sizes
 from tactile_cube.agent.sac import Sac
 from tactile_cube.api.environment import env_config
 from tactile_cube.composition import composed, help_text, refuse_unknown_keys, suggestion
-from tactile_cube.curriculum import NoCurriculum
 from tactile_cube.errors import InputError
 from tactile_cube.sweep import sweep_folder
 from tactile_cube.training.settings import CollectorSettings, RunSettings, TrainingSettings
@@ -63,6 +62,26 @@ def test_a_command_leaves_the_environment_of_later_programs_as_it_was(monkeypatc
     with pytest.raises(SystemExit, match="2"):
         cli.command_line("effects")()
     assert os.environ["HYDRA_FULL_ERROR"] == "0"
+
+
+@pytest.mark.parametrize(
+    ("name", "words", "said"),
+    [
+        ("effects", ["stribek"], "effect 'stribek' is unknown; did you mean stribeck_friction?"),
+        ("diagnose", ["rec"], "rec: settings are KEY=VALUE; did you mean recording=rec?"),
+        ("diagnose", ["recordng=rec"], "recordng: no such setting; did you mean recording?"),
+        ("record", ["source=csv", "source.controller.ki=5"], "source.controller.ki: no such setting; did you mean"),
+        ("record", ["source=csv", "source.xyzzy=5"], "source.xyzzy: no such setting; --help lists them"),
+        ("diagnose", [], "give either recording=FOLDER (of a recording.yaml) or logs to import: source=csv"),
+    ],
+)
+def test_a_mistyped_command_line_is_told_what_was_meant(
+    name: str, words: list[str], said: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", [name, *words])
+    with pytest.raises(SystemExit, match="2"):
+        cli.command_line(name)()
+    assert capsys.readouterr().err.startswith(f"error: {said}")
 
 
 def test_input_error_is_found_behind_what_hydra_wraps_around_it() -> None:
@@ -118,16 +137,16 @@ def test_fail_prints_one_line_and_exits_with_2(capsys: pytest.CaptureFixture[str
 
 def test_a_value_that_another_choice_of_a_group_had_is_named() -> None:
     with pytest.raises(InputError) as info:
-        env_config(experiment="alone", curriculum="linear")
-    assert "LinearCurriculum.__init__() got an unexpected keyword argument" in str(info.value)
-    assert "full_key: env.curriculum; if it was set for another choice of the group, ~GROUP.KEY" in str(info.value)
-    without = {"~curriculum.low": None, "~curriculum.high": None}
-    assert env_config(experiment="alone", curriculum="linear", values=without).curriculum
+        env_config(experiment="alone", exploration="none", start="paper", values={"+start.file": "grasps.npz"})
+    assert "StartStates.__init__() got an unexpected keyword argument" in str(info.value)
+    assert "full_key: env.start; if it was set for another choice of the group, ~GROUP.KEY" in str(info.value)
 
 
 @pytest.mark.parametrize("experiment", ["alone", "curriculum"])
 def test_any_curriculum_can_be_left_out(experiment: str) -> None:
-    assert isinstance(env_config(experiment=experiment, curriculum="none").curriculum, NoCurriculum)
+    ramps = env_config(experiment=experiment, curriculum="none").curriculum
+    assert ramps is not None
+    assert ramps.by is None
 
 
 def test_folders_of_a_sweep_neither_begin_with_a_dash_nor_nest_nor_grow_too_long() -> None:
@@ -151,7 +170,7 @@ def test_help_marks_the_default_of_each_group() -> None:
     [
         ("agent.gama=1", "agent.gamma"),
         ("gamma=1", "agent.gamma"),
-        ("trainig.steps=1", "training"),
+        ("trainig.steps=1", "training.steps"),
         ("taks=table", "task"),
         ("task=tabel", "task=table"),
         ("+experiment=curiculum", "experiment=curriculum"),

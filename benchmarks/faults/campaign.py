@@ -107,7 +107,7 @@ def results(folder: Path) -> dict[str, Any]:
     with (folder / "metrics.csv").open(newline="") as file:
         rows = [{key: value for key, value in row.items() if key not in TIMES} for row in csv.DictReader(file)]
     policy = load_actor(folder / "policy.safetensors")[0].state_dict()
-    replay = state["learner"]["replay"]["rows"]
+    replay = state["learner"]["replay"]["transitions"]
     return {"agent": state["learner"]["agent"], "replay": replay, "rows": rows, "policy": policy}
 
 
@@ -123,7 +123,7 @@ def same(a: Any, b: Any) -> bool:
 
 
 def damaged_checkpoints(folder: Path) -> int:
-    """Checkpoints that cannot be read; the replay's files are read with the newest."""
+    """Checkpoints that cannot be read."""
     damaged = 0
     for path in (folder / FILE, folder / BEFORE):
         try:
@@ -131,10 +131,6 @@ def damaged_checkpoints(folder: Path) -> int:
                 load_checkpoint(path)
         except InputError:
             damaged += 1
-    try:
-        Checkpoints(folder).load()
-    except InputError:
-        damaged += 1
     return damaged
 
 

@@ -12,6 +12,5 @@ from tactile_cube.training.build import as_environment
 
 torch.set_num_threads(1)
 worlds = as_environment(instantiate(composed("train", ["+experiment=smoke"]).env)).make(worlds=1, seed=0)
-worlds.set_progress(0, 0.0)
 worlds.rollout(1)
 worlds.close()

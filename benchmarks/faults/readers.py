@@ -182,7 +182,7 @@ def state(written: int, capacity: int, seed: int) -> dict[str, Any]:
     rows = torch.arange(2 * written, dtype=torch.float32).reshape(written, 2)
     ring = torch.empty(min(written, capacity), 2)
     ring[torch.arange(written)[-capacity:] % capacity] = rows[-capacity:]
-    replay = {"rows": ring, "written": written, "capacity": capacity, "generator": random.get_state()}
+    replay = {"transitions": [ring], "written": written, "capacity": capacity, "generator": random.get_state()}
     agent = {"parameters": [torch.randn(3, generator=random)], "updates": written}
     return {"learner": {"agent": agent, "replay": replay}, "best_angle": 0.5, "config": {"seed": seed}}
 

@@ -17,6 +17,7 @@ from tactile_cube.agent.networks import Actor
 from tactile_cube.gymnasium_env import GymnasiumRotation
 from tactile_cube.training.build import Environment
 from tactile_cube.training.collection import Collection, MultiSyncCollection, SingleCollection
+from tactile_cube.training.settings import CollectorSettings
 from tactile_cube.transforms.make_env import rotation_env
 
 YARDSTICK = "the bare task, one world"
@@ -46,7 +47,7 @@ def collector(
         scale = dict.fromkeys(cases, steps)
         for n in worlds:
             name = f"TorchRL collector, {n} world{'s' if n > 1 else ''}"
-            collection = SingleCollection(environment.make, actor_of(environment), n, steps)
+            collection = SingleCollection(environment.make, actor_of(environment), CollectorSettings(worlds=n), steps)
             stack.callback(collection.close)
             cases[name], scale[name] = collecting(collection, environment), n * steps
         timings = in_turns(cases, rounds, 1)
@@ -66,7 +67,8 @@ def _processes(environment: Environment, rounds: int, worlds: int, processes: tu
     speeds = []
     for n in processes:
         actor = actor_of(environment)
-        collection = MultiSyncCollection(environment.make, actor, worlds, steps, n, TIMEOUT, TIMEOUT, "fork")
+        settings = CollectorSettings(worlds=worlds, processes=n, timeout=TIMEOUT)
+        collection = MultiSyncCollection(environment.make, actor, settings, steps)
         try:
             timing = in_turns({"": collecting(collection, environment)}, rounds, 1)[""]
         finally:

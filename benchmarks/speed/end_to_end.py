@@ -95,7 +95,6 @@ def _run(
             random_steps=0,
             replay_size=20_000,
         ),
-        loggers={},
         config={},
     )
     run.learner.collection.restart(0, (0, 0.0))

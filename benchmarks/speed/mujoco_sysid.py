@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.identification.fitting.base import TOLERANCE
+from tactile_cube.identification.fitting.unknowns import TOLERANCE
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
 from tactile_cube.measurement.replay.nominal import nominal_model

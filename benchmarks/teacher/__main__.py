@@ -33,7 +33,7 @@ def main() -> None:
     given = parser.parse_intermixed_args()
     given.out.mkdir(parents=True, exist_ok=True)
     began = time.process_time()
-    ledger = Ledger(given.out / LEDGER, 1, lambda: time.process_time() - began, in_process=True)
+    ledger = Ledger(given.out / LEDGER, lambda: time.process_time() - began, in_process=True)
     asked = dict(word.split("=", 1) for word in given.settings)
     config = tactile_cube.env_config(values=SETTINGS | {key: yaml.safe_load(value) for key, value in asked.items()})
     worlds = [rotation_env(config) for _ in range(given.worlds)]

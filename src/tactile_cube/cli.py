@@ -8,14 +8,17 @@ from __future__ import annotations
 import contextlib
 import functools
 import os
+import re
 import sys
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 from tactile_cube import commands
 from tactile_cube.api.job import typed_job
 from tactile_cube.composition import CONFIG, help_text, refuse_unknown_keys, with_recipe
+from tactile_cube.errors import InputError
 from tactile_cube.run_folder import INTERRUPTED, USAGE_ERROR, configuration_in, console_kept_in
 from tactile_cube.usage_error import usage_error
 
@@ -66,6 +69,7 @@ def _run(name: str) -> None:
 
         task.__module__ = f"{__package__}.{name}"  # Hydra names the job and its log by it
         try:
+            _refuse_plain_words(name, sys.argv[1:])
             hydra.main(version_base="1.3", config_path=str(CONFIG.resolve()), config_name=name)(task)()
         finally:
             os.environ["HYDRA_FULL_ERROR"] = asked
@@ -76,6 +80,19 @@ def _run(name: str) -> None:
         if failed:
             print(f"{len(failed)} of {len(swept)} runs failed: {', '.join(failed)}", file=sys.stderr)
             sys.exit(1)
+
+
+def _refuse_plain_words(name: str, words: list[str]) -> None:
+    """Refuse a value without its key, for which Hydra has words that nobody understands."""
+    for before, word in pairwise(["", *words]):
+        if not before.startswith("-") and re.fullmatch(r"[^-~=][^=]*", word):
+            if name == "effects":
+                from tactile_cube.api.effects import effects
+
+                effects(word)
+            first = re.search(r"^(?!defaults)\w+(?=:)", (CONFIG / f"{name}.yaml").read_text(encoding="utf-8"), re.M)
+            meant = f"{word}=OPTION" if (CONFIG / word).is_dir() else f"{first and first[0]}={word}"
+            raise InputError(f"{word}: settings are KEY=VALUE; did you mean {meant}?")
 
 
 def _guarded(name: str, wants_traceback: bool, config: DictConfig, folder: Path) -> float | None:

@@ -133,7 +133,7 @@ def train(job: Job) -> float:
     """Train a policy; the same command resumes it.
 
     What a run writes into its folder: metrics.csv, tensorboard/, policy.safetensors (latest) and
-    policy_best.safetensors, checkpoint.pt, checkpoint_before.pt and replay/ (to go on from), train.log (what the
+    policy_best.safetensors, trial.gif, checkpoint.pt and checkpoint_before.pt (to go on from), train.log (what the
     console showed), ledger.json (CPU-hours), finished.json (how it ended) and .hydra/ (configuration). A training in
     stages has such a folder for each of them in its own, and bullet/ and mujoco/ with the judgement.
 

@@ -17,7 +17,7 @@ from tactile_cube.whole_file import write_whole
 if TYPE_CHECKING:
     from omegaconf import DictConfig
 
-CONFIGURATION = ".hydra"
+CONFIGURATION, CHECKPOINT = ".hydra", "checkpoint.pt"
 USAGE_ERROR = 2  # exit status of a command that was refused
 INTERRUPTED = 130  # exit status after Ctrl-C
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tactile_cube import limits
 from tactile_cube.errors import InputError
 
+LONGEST_POINTER = 1000  # bytes
 KINDS = (("a folder", stat.S_ISDIR), ("a pipe", stat.S_ISFIFO), ("a socket", stat.S_ISSOCK))
 
 
@@ -52,6 +53,8 @@ def regular(path: Path, most: int = limits.TABLE, lacking: str = "") -> Path:
         raise InputError(f"{path}: is {kind}; a regular file is needed here")
     if status.st_size > most:
         raise InputError(f"{path}: has {status.st_size / 1e6:.4g} MB; up to {most / 1e6:g} MB are read here")
+    if status.st_size < LONGEST_POINTER and path.read_bytes().startswith(b"version https://git-lfs"):
+        raise InputError(f"{path}: only points to the file in Git LFS; fetch it: git lfs pull")
     return path
 
 

@@ -1,6 +1,7 @@
 """What a user did wrong, in one line, from the errors of this package, of pydantic, of Hydra and of the disk."""
 
 import errno
+import re
 import traceback
 from collections.abc import Iterator
 from typing import Any
@@ -52,6 +53,8 @@ def _one_line(error: BaseException) -> str:
     from pydantic import ValidationError
 
     cause = error.__cause__ or error.__context__
+    if key := re.match(r"Could not override '([^']+)'.\s*To append to your config", str(error)):
+        return f"{key[1]}: no such setting{near_key(key[1]) or '; --help lists them'}"
     if isinstance(error, MissingMandatoryValue):
         return f"{error.full_key}=... is missing{meaning(str(error.full_key))}"
     if isinstance(error, ValidationError):

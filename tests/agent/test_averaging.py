@@ -5,9 +5,8 @@ from pathlib import Path
 import pytest
 import torch
 
-from tactile_cube.agent.averaging import averaged, kept_policies
 from tactile_cube.agent.networks import Actor, Sizes
-from tactile_cube.agent.policy_file import PolicyInfo, load_actor, save_policy
+from tactile_cube.agent.policy_file import PolicyInfo, averaged, kept_policies, load_actor, save_policy
 from tactile_cube.errors import InputError
 
 

@@ -5,7 +5,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import polars
+import pytest
 
 from tactile_cube.drivetrain.model_file import read_model
 from tests.measurement.small_rig import URDF, table, write
@@ -58,6 +60,53 @@ def test_a_csv_import_that_failed_does_not_block_the_corrected_command(tmp_path:
     assert "rec: 2 trials (sines), 6 s, joints a, b" in right.stdout
     assert {path.name for path in tmp_path.iterdir()} >= {"rec", "outputs"}
     assert not list(tmp_path.glob(".rec*"))
+
+
+ARM = """<robot name="arm"><link name="base"/><link name="upper"><inertial><origin xyz="0.1 0 0"/><mass value="0.4"/>
+<inertia ixx="1e-4" iyy="1.6e-2" izz="1.6e-2" ixy="0" ixz="0" iyz="0"/></inertial></link><joint name="shoulder_pan"
+type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 0 1"/><limit lower="-2" upper="2" effort="5"
+velocity="9"/></joint></robot>"""
+KP, KD, INERTIA, DELAY, FPS = 6.0, 0.6, 0.02, 0.06, 30
+
+
+def lerobot_set(folder: Path) -> None:
+    """Episodes that are cut out of a motion, of J dv = KP (q_d(t - DELAY) - q) - KD v; position is read, then sent."""
+    rng, steps = np.random.default_rng(0), 100
+    rows = []
+    for episode in range(4):
+        corners = np.cumsum(np.concatenate([[0.0], rng.uniform(0.2, 0.7, 40)]))
+        command = np.interp(np.arange(12 * FPS) / FPS, corners, rng.uniform(-1.0, 1.0, 41))
+        held = np.concatenate([np.full(round(DELAY * FPS * steps), command[0]), np.repeat(command, steps)])
+        q, v, position = command[0], 0.0, np.zeros(len(command))
+        for k in range(len(command) * steps):
+            position[k // steps] = q if k % steps == 0 else position[k // steps]
+            v += (KP * (held[k] - q) - KD * v) / INERTIA / FPS / steps
+            q += v / FPS / steps
+        read = np.round(position * 4096 / (2 * np.pi)) * 360 / 4096
+        for k in range(2 * FPS, len(command)):
+            degrees = [np.rad2deg(command[k])], [read[k]]
+            rows.append((*degrees, k / FPS - 2, episode))
+    names = ["action", "observation.state", "timestamp", "episode_index"]
+    (folder / "data/chunk-000").mkdir(parents=True)
+    (folder / "meta").mkdir()
+    features = {name: {"names": ["shoulder_pan.pos"]} for name in names[:2]}
+    (folder / "meta/info.json").write_text(json.dumps({"fps": FPS, "features": features}))
+    polars.DataFrame(rows, schema=names, orient="row").write_parquet(folder / "data/chunk-000/file-000.parquet")
+
+
+def test_from_a_lerobot_data_set_to_a_named_effect_by_one_command(tmp_path: Path) -> None:
+    lerobot_set(tmp_path / "set")
+    (tmp_path / "arm.urdf").write_text(ARM)
+    words = ["source=csv", "source.files=set", "source.urdf=arm.urdf", "source.angle_unit=deg", "hydra.run.dir=run"]
+    words += [f"source.controller.kp={KP}", f"source.controller.kd={KD}"]
+    asked = run("diagnose", *words, folder=tmp_path)
+    assert asked.returncode == 0, asked.stderr
+    assert "one where 'episode_index' changes" in asked.stdout
+    assert "of 4 trials; their first 0.4 s count in no error" in asked.stdout
+    (effect,) = read_model(tmp_path / "run" / "model.yaml").effects
+    assert effect.effect == "command_delay@shoulder_pan"
+    assert effect.parameters["delay"].value == pytest.approx(DELAY, abs=0.002)
+    assert read_model(tmp_path / "run" / "model.yaml").provenance.recording == "run/recording"
 
 
 def test_what_is_known_already_is_no_news_to_diagnose(tmp_path: Path) -> None:

@@ -26,7 +26,7 @@ def trained(**settings: Any) -> TransformedEnv:
     """What `train` learns in, once its curriculum is over."""
     words = [as_word(key, value) for key, value in settings_of(settings).items()]
     env = as_environment(instantiate(composed("train", words).env)).make(worlds=1, seed=3)
-    env.set_progress(10**9, 100.0)
+    env.transform[0].set_progress(10**9, 100.0)
     return env
 
 

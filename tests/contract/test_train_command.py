@@ -82,7 +82,7 @@ def test_fine_tuning_goes_on_from_the_shipped_policy(tmp_path: Path) -> None:
         (["training.init_from=nobody"], "training.init_from=nobody: no such file"),
         (["+experiment=papr"], "did you mean experiment=paper?"),
         (["+experimnt=paper"], "experimnt: no such setting of train; --help lists them; did you mean experiment?"),
-        (["task"], "missing EQUAL"),
+        (["task"], "task: settings are KEY=VALUE; did you mean task=OPTION?"),
         (["+experiment=smoke", "collector.worlds=0"], "error: collector.worlds=0: Input should be greater than 0\n"),
     ],
 )

@@ -245,7 +245,7 @@ def checkpoint(state: Any) -> None:
 
 
 def state(**changes: Any) -> dict[str, Any]:
-    replay = {"written": 0, "capacity": 5, "width": 3, "segments": [], "generator": None}
+    replay = {"written": 0, "capacity": 5, "transitions": [torch.zeros(0, 3)], "generator": None}
     learner = {"agent": {"parameters": torch.zeros(3)}, "replay": replay | changes.pop("replay", {})}
     return {"learner": learner | changes, "best_angle": 0.0, "config": {}}
 
@@ -254,8 +254,8 @@ BAD_STATES = {
     "a pickle that runs something": ({"learner": Harmful()}, "damaged checkpoint"),
     "a list": ([1, 2], "damaged checkpoint"),
     "no learner": ({"learner": 3}, "damaged checkpoint"),
-    "a replay that claims 1e15 rows": (state(replay={"written": 10**15, "capacity": 10**15}), f"claims {10**15} rows"),
-    "rows in a file that is not there": (state(replay={"written": 9, "segments": [(0, 9, "")]}), "is missing"),
+    "a replay that claims 1e15 rows": (state(replay={"written": 10**15, "capacity": 10**15}), f"claims {10**15} tran"),
+    "a replay that is no list": (state(replay={"transitions": 3}), "damaged checkpoint"),
     "a number repeated 1e12 times": (state(agent={"a": torch.zeros(1).expand(10**12)}), "more than the file"),
     "weights that are no numbers": (state(agent={"a": [torch.tensor([torch.nan])]}), "not finite"),
 }

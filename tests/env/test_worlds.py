@@ -6,7 +6,6 @@ import pytest
 import torch
 from torchrl.envs.utils import check_env_specs, step_mdp
 
-from tactile_cube.curriculum import LinearCurriculum
 from tactile_cube.env import OUTCOMES, RotationEnv
 from tactile_cube.env.worlds import WorldsEnv
 from tactile_cube.randomization import Randomization, Uniform
@@ -51,23 +50,12 @@ def test_faulty_world_is_marked_and_truncated(scripted_world: Any, rotation_task
     assert after["truncated"].flatten().tolist() == [True, False]
 
 
-def test_progress_acts_at_the_next_reset(rotation_task: MakeTask) -> None:
-    env = WorldsEnv([rotation_task()], LinearCurriculum(begin=100, length=100))
-    env.reset()
-    assert env.tasks[0].constants.filter_time == pytest.approx(0.12)
-    shown = env.set_progress(150, 0.0)
-    assert shown.columns() == pytest.approx({"T_s": 0.31, "gravity": 0.525, "penalty": 1.0})
-    assert env.tasks[0].constants.filter_time == pytest.approx(0.12)
-    env.reset()
-    assert env.tasks[0].constants.filter_time == pytest.approx(0.31)
-
-
-def test_steered_constants_are_drawn_by_the_odds_of_the_last_progress_and_told(rotation_task: MakeTask) -> None:
+def test_steered_constants_are_drawn_by_the_odds_and_told(rotation_task: MakeTask) -> None:
     steered = Randomization(values={"cube_mass": Uniform(0.0, 0.8)}, steered=0.5)
     env = WorldsEnv([rotation_task(randomization=steered) for _ in range(3)])
     check_env_specs(env)
     fifth = np.eye(8)[[4]]
-    env.set_progress(0, 0.0, fifth)
+    env.odds = fifth
     places = env.reset()["places"].flatten().tolist()
     masses = [task.constants.cube_mass for task in env.tasks]
     assert all(0.4 <= mass < 0.5 for mass in masses)

@@ -6,9 +6,8 @@ from tactile_cube.env import Task
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.evaluation import EvaluationRun, VariantResult, read_results, write_results
 from tactile_cube.evaluation.policies import HoldPolicy, PolicySource
-from tactile_cube.evaluation.protocol import Protocol
+from tactile_cube.evaluation.protocol import Protocol, Variant
 from tactile_cube.evaluation.summary import summarise
-from tactile_cube.evaluation.variant import Variant
 from tactile_cube.evaluation.verdict import judge_episode
 from tests.evaluation.synthetic import episode
 

@@ -12,11 +12,9 @@ from tactile_cube.env import Task
 from tactile_cube.env.reward import TOUCH_FORCE
 from tactile_cube.evaluation.evaluation import DisplacedStart, Evaluation
 from tactile_cube.evaluation.policies import HoldPolicy, RandomPolicy, ReplayPolicy, ScriptedPolicy
-from tactile_cube.evaluation.protocol import Protocol
+from tactile_cube.evaluation.protocol import Protocol, Pull, Variant
 from tactile_cube.evaluation.rollout import run_episode
-from tactile_cube.evaluation.touch import support
-from tactile_cube.evaluation.variant import Pull, Variant
-from tactile_cube.evaluation.verdict import EpisodeVerdict
+from tactile_cube.evaluation.verdict import EpisodeVerdict, support
 from tactile_cube.hand import DLR_HAND2, tip_positions
 from tactile_cube.randomization import Randomization, Uniform
 from tactile_cube.simulation import SimulationOptions

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.fitting.shooting import Shooting
-from tactile_cube.identification.search.division import Division
+from tactile_cube.identification.search.search import Search
 from tactile_cube.measurement.comparing.noise_floor import sensor_noise
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Term
@@ -23,10 +23,10 @@ def fitted_rivals(recording: Recording, *rivals: Rival) -> tuple[Shooting, dict[
     fitted, held_out = held_out_split(recording)
     noise = sensor_noise(recording)
     effects = list(dict.fromkeys(find_effect(name) for rival in rivals for name in rival))
-    division = Division(Shooting(fitted, effects), fitted, held_out, noise)
+    search = Search(fitted, held_out, noise, effects, lambda line: None)
     fits = {}
     for rival in rivals:
         named = [(find_effect(name)(recording.joints[0], **start), tuple(start)) for name, start in rival.items()]
         terms = tuple(Term(type(effect), recording.joints[0], effect.values, free) for effect, free in named)
-        fits["+".join(rival)] = division.refitted(replace(division.start, terms=terms))
-    return division.shooting, fits, noise
+        fits["+".join(rival)] = search.refitted(replace(search.start, terms=terms))
+    return search.shooting, fits, noise

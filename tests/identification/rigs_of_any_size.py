@@ -54,14 +54,22 @@ class Size:
 
 
 def simulated(
-    folder: Path, size: Size, effect: type[Effect], values: dict[str, float], wound: float = 0.0
+    folder: Path,
+    size: Size,
+    effect: type[Effect],
+    values: dict[str, float],
+    wound: float = 0.0,
+    repeats: int = 2,
+    every: float = 0.0,
 ) -> Recording:
-    """Four trials, two of each of two kinds, of a rig with a hidden effect (its values at the size wanted).
+    """Trials of two kinds, each repeated, of a rig with a hidden effect (its values at the size wanted).
 
-    An integral of its controller begins `wound` [N m] beyond balance.
+    An integral of its controller begins `wound` [N m] beyond balance. A trial begins `every` so many seconds.
     """
     stated = _stated(size)
-    trials = [{"file": f"{kind}{n}.parquet", "initialisation": 0, "kind": kind} for kind in COMMANDS for n in (0, 1)]
+    trials = [
+        {"file": f"{kind}{n}.parquet", "initialisation": 0, "kind": kind} for n in range(repeats) for kind in COMMANDS
+    ]
     described: dict[str, Any] = {
         "format": 1,
         "gravity": [0.0, 0.0, -9.81 * size.length / size.time**2],
@@ -77,9 +85,10 @@ def simulated(
     (folder / "rig.urdf").write_text(text)
     (folder / "recording.yaml").write_text(yaml.safe_dump(described))
     time = STEP * np.arange(SAMPLES)
-    for trial in trials:
+    begun = every * np.arange(len(trials))
+    for trial, start in zip(trials, begun, strict=True):
         command = size.position * COMMANDS[str(trial["kind"])](time)
-        columns = {"time": size.time * time, "a.command": command, "a.position": 0.95 * command}
+        columns = {"time": start + size.time * time, "a.command": command, "a.position": 0.95 * command}
         polars.DataFrame(columns).write_parquet(folder / str(trial["file"]))
     planned = read_recording(folder)
     shooting = Shooting(planned, EFFECTS)
@@ -90,9 +99,9 @@ def simulated(
     model = Model(plain.constants, (Term(effect, "a", known.values, ()),), plain.offsets)
     played = shooting.positions([model], windows)[0]
     rng = np.random.default_rng(1)
-    for entry, trial, ideal in zip(trials, planned.trials, played, strict=True):
+    for entry, start, trial, ideal in zip(trials, begun, planned.trials, played, strict=True):
         position = ideal[:, 0] + NOISE * size.position * rng.normal(size=SAMPLES)
-        columns = {"time": trial.time, "a.command": trial.command[:, 0], "a.position": position}
+        columns = {"time": start + trial.time, "a.command": trial.command[:, 0], "a.position": position}
         polars.DataFrame(columns).write_parquet(folder / str(entry["file"]))
     return read_recording(folder)
 

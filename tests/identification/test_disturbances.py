@@ -8,8 +8,7 @@ import pytest
 
 from tactile_cube.drivetrain.effects import catalogue, find_effect
 from tactile_cube.identification.disturbances import Disturbance, disturbances, in_time, undisturbed
-from tactile_cube.identification.fitting.shooting import Shooting
-from tactile_cube.identification.search.division import Division
+from tactile_cube.identification.search.search import Search
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.nominal import nominal_model
@@ -47,8 +46,8 @@ def pushed(plain: Recording, *numbers: int) -> Recording:
 
 
 def found(recording: Recording) -> list[Disturbance]:
-    division = Division(Shooting(recording, EVERY), recording, recording, NOISE)
-    return disturbances(division, recording, nominal_model(recording))
+    search = Search(recording, recording, NOISE, EVERY, lambda line: None)
+    return disturbances(search, recording, nominal_model(recording))
 
 
 def test_a_push_is_found_with_its_trial_joint_and_time(plain: Recording) -> None:

@@ -57,13 +57,13 @@ def undecided(kind: Kind, rivals: int, doubtful: int) -> Diagnosis:
     """A diagnosis of that verdict, with so many rivals and unproven effects."""
     names = ["backlash", "torque_bias", "torque_gain", "payload", "cogging"]
     told = findings(20.0)
-    unproven = tuple(explanation(name, 5.0) for name in names[:doubtful])
+    unproven = tuple(replace(explanation(name, 5.0), p_value=0.5) for name in names[:doubtful])
     fitted = Fitted(FIT.model, FIT, np.zeros(0), np.zeros(0))
     others = tuple((explanation(name, 1.0), fitted) for name in names[:rivals])
     chosen = explanation("command_delay", 1.0) if rivals else told.base
     return Diagnosis(
         Verdict(kind, chosen),
-        replace(told, unproven=unproven),
+        replace(told, judged=unproven),
         fitted,
         others,
         {},

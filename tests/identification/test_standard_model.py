@@ -9,8 +9,8 @@ import pytest
 import yaml
 from numpy.typing import NDArray
 
-from tactile_cube.identification.fitting.held_out import HeldOut
 from tactile_cube.identification.fitting.shooting import Shooting
+from tactile_cube.identification.search.evidence import HeldOut
 from tactile_cube.identification.standard_model import StandardModel, fit_standard_model, soft_l1
 from tactile_cube.measurement.comparing.noise_floor import noise_with_links, reading_step
 from tactile_cube.measurement.recordings.reading import read_recording

@@ -44,7 +44,7 @@ def at_its_edge(name: str) -> Fit:
 
 def findings(base: float, *level: Explanation) -> Findings:
     start = Explanation((), FIT, judged(base), 1.0, 0.0)
-    return Findings(start, judged(2 * base), (level,) if level else (), ())
+    return Findings(start, judged(2 * base), level)
 
 
 def test_a_base_model_at_the_noise_is_adequate() -> None:
@@ -64,9 +64,10 @@ def test_where_nothing_is_named_the_model_that_predicts_best_is_recommended() ->
     best = replace(explanation("payload", 10.0), effects=(*plain.effects, *explanation("payload", 10.0).effects))
     verdict = decide(findings(20.0, plain, best))
     assert (verdict.kind, verdict.chosen) == ("unknown_effect", best)
-    beside = replace(findings(20.0, plain), unclear=(best,))
-    assert decide(beside) == verdict
-    assert decide(replace(beside, unclear=(replace(best, fit=at_its_edge("payload")),))).chosen == plain
+    doubtful = replace(best, p_value=0.5)
+    beside = findings(20.0, plain, doubtful)
+    assert decide(beside).chosen == doubtful
+    assert decide(findings(20.0, plain, replace(doubtful, fit=at_its_edge("payload")))).chosen == plain
 
 
 def test_an_error_that_no_effect_lowers_is_unknown() -> None:
@@ -169,8 +170,7 @@ def test_a_rival_that_the_held_out_trials_speak_against_is_none() -> None:
 def test_one_effect_that_does_as_well_beats_two() -> None:
     one = explanation("stribeck_friction", 1.03)
     both = replace(one, effects=(*one.effects, *explanation("torque_bias", 1.0).effects))
-    found = Findings(findings(20.0).base, judged(40.0), ((both,), (one,)), ())
-    assert decide(found).chosen is one
+    assert decide(findings(20.0, both, one)).chosen is one
 
 
 def with_waves(one: Explanation, sine: float) -> Explanation:

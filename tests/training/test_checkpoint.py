@@ -8,26 +8,16 @@ import pytest
 import torch
 
 from tactile_cube.errors import InputError
-from tactile_cube.training import checkpoint, replay
+from tactile_cube.training import checkpoint
 from tactile_cube.training.checkpoint import BEFORE, FILE, load_checkpoint
 from tests.training.tiny_run import finish, tiny_run
 
 
-def test_two_checkpoints_and_no_more_rows_than_they_need_are_kept(tmp_path: Path) -> None:
+def test_two_checkpoints_and_nothing_half_written_are_kept(tmp_path: Path) -> None:
     finish(tiny_run(tmp_path))
     names = {path.name for path in tmp_path.iterdir()}
     assert {FILE, BEFORE} <= names
     assert not any("partial" in name or "next" in name for name in names)
-    rows = sorted(int(path.stem) for path in (tmp_path / "replay").iterdir())
-    assert rows == [0, 80], "the ring of 120 rows, and what the checkpoint before needs of the rows that left it"
-
-
-def test_a_checkpoint_writes_only_the_rows_that_are_new(tmp_path: Path) -> None:
-    finish(tiny_run(tmp_path, steps=80))
-    before = (tmp_path / "replay/000000000000.f32").stat()
-    finish(tiny_run(tmp_path))
-    after = (tmp_path / "replay/000000000000.f32").stat()
-    assert (before.st_ino, before.st_mtime_ns) == (after.st_ino, after.st_mtime_ns)
 
 
 def test_the_replay_comes_back_row_for_row_after_the_ring_went_round(tmp_path: Path) -> None:
@@ -35,16 +25,15 @@ def test_the_replay_comes_back_row_for_row_after_the_ring_went_round(tmp_path: P
     finish(whole)
     resumed = tiny_run(tmp_path, steps=240)
     assert resumed.learner.replay.buffer.write_count > resumed.learner.replay.capacity
-    assert torch.equal(resumed.learner.replay.rows[:], whole.learner.replay.rows[:])
+    assert (resumed.learner.replay.buffer[:] == whole.learner.replay.buffer[:]).all()
 
 
-@pytest.mark.parametrize("victim", [FILE, "replay/000000000080.f32"])
 @pytest.mark.parametrize("damage", ["flip", "cut", "gone"])
 def test_damage_to_the_newest_is_said_and_the_one_before_is_used(
-    tmp_path: Path, reference: torch.Tensor, victim: str, damage: str, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, reference: torch.Tensor, damage: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     finish(tiny_run(tmp_path))
-    path = tmp_path / victim
+    path = tmp_path / FILE
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 1
     {
@@ -57,7 +46,7 @@ def test_damage_to_the_newest_is_said_and_the_one_before_is_used(
     resumed.announce()
     said = capsys.readouterr().out
     assert "the run goes on from the checkpoint before it" in said
-    assert victim in said
+    assert FILE in said
     assert torch.equal(finish(resumed), reference)
 
 
@@ -68,18 +57,6 @@ def test_when_both_are_damaged_the_file_and_the_remedy_are_named(tmp_path: Path)
     with pytest.raises(InputError, match=r"checkpoint\.pt: damaged checkpoint .*training\.resume=never starts over"):
         tiny_run(tmp_path)
     assert tiny_run(tmp_path, resume="never").learner.steps == 0
-
-
-def test_files_of_others_beside_the_rows_are_kept_and_a_link_is_not_followed(tmp_path: Path) -> None:
-    (tmp_path / "replay").mkdir()
-    (tmp_path / "replay" / "measured.csv").write_text("mine")
-    finish(tiny_run(tmp_path))
-    finish(tiny_run(tmp_path, resume="never"))
-    assert (tmp_path / "replay" / "measured.csv").read_text() == "mine"
-    (tmp_path / "run").mkdir()
-    (tmp_path / "run" / "replay").symlink_to(tmp_path / "replay")
-    with pytest.raises(InputError, match="replay: is a link"):
-        tiny_run(tmp_path / "run")
 
 
 def test_starting_over_leaves_nothing_of_the_run_before_and_a_refusal_all_of_it(tmp_path: Path) -> None:
@@ -103,7 +80,7 @@ def test_a_folder_in_the_place_of_a_checkpoint_is_damage(tmp_path: Path) -> None
         tiny_run(tmp_path)
 
 
-@pytest.mark.parametrize("failing", ["rows", "state", "rename"])
+@pytest.mark.parametrize("failing", ["write_whole", "sync_folder"])
 def test_a_full_disk_leaves_the_checkpoint_before_whole(
     tmp_path: Path, reference: torch.Tensor, monkeypatch: pytest.MonkeyPatch, failing: str
 ) -> None:
@@ -113,12 +90,7 @@ def test_a_full_disk_leaves_the_checkpoint_before_whole(
     def full(*_: Any) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    where = {
-        "rows": (replay, "write_whole"),
-        "state": (checkpoint, "write_whole"),
-        "rename": (checkpoint, "sync_folder"),
-    }
-    monkeypatch.setattr(*where[failing], full)
+    monkeypatch.setattr(checkpoint, failing, full)
     with pytest.raises(InputError, match=r"checkpoint\.pt: cannot be written \(No space left.*disk full"):
         run.train()
     run.close()
@@ -129,6 +101,6 @@ def test_a_full_disk_leaves_the_checkpoint_before_whole(
 
 
 def test_a_checkpoint_of_an_older_version_is_told_as_that(tmp_path: Path) -> None:
-    (tmp_path / FILE).write_bytes(b"tactile_cube checkpoint 2, sha256 " + b"0" * 64 + b"\n")
+    (tmp_path / FILE).write_bytes(b"tactile_cube checkpoint 3, sha256 " + b"0" * 64 + b"\n")
     with pytest.raises(InputError, match=r"of another version of this program; begin with its policy\.safetensors"):
         load_checkpoint(tmp_path / FILE)

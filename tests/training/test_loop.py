@@ -8,13 +8,11 @@ from typing import Any
 
 import pytest
 import torch
-from tensordict import TensorDict
 
 from tactile_cube.agent.sac import Sac
 from tactile_cube.errors import InputError
 from tactile_cube.randomization import Learnability, Uniform
 from tactile_cube.training.build import FROZEN
-from tactile_cube.training.replay import FLAGS, Replay
 from tests.training.tiny_env import tiny_environment
 from tests.training.tiny_run import finish, tiny_run
 
@@ -85,26 +83,6 @@ def test_changed_settings_are_not_mixed_into_a_run(tmp_path: Path) -> None:
     assert fresh.learner.steps == 0
 
 
-def no_transition(replay: Replay) -> TensorDict:
-    parts = {k: torch.zeros(1, w, dtype=torch.bool if k in FLAGS else None) for k, w in replay.widths.items()}
-    return TensorDict(parts, [1])
-
-
-def test_learner_uses_the_replay_of_the_iteration_before(tmp_path: Path) -> None:
-    run = tiny_run(tmp_path, learning_starts=0, random_steps=0)
-    run.learner.replay.extend(no_transition(run.learner.replay))
-    seen = []
-    sample = run.learner.replay.sample
-
-    def watched(*args: Any) -> Any:
-        seen.append(run.learner.replay.buffer.write_count)
-        return sample(*args)
-
-    run.learner.replay.sample = watched  # type: ignore[method-assign]
-    run.train()
-    assert seen[:6] == [1, 1, 1, 21, 21, 21]
-
-
 def test_run_gives_up_without_regrasping_and_finishes_early_when_good(tmp_path: Path) -> None:
     assert "no regrasping" in tiny_run(tmp_path / "a", stop_if_no_regrasp_by=80).train()
     good = tiny_run(tmp_path / "b", stop_when_angle_above=0.0001, random_steps=0)
@@ -173,7 +151,7 @@ def test_a_run_can_begin_with_the_experience_of_another(tmp_path: Path) -> None:
     finish(first)
     next_one = tiny_run(tmp_path / "next", init_from=str(tmp_path / "first" / "checkpoint.pt"), init_replay=True)
     assert len(next_one.learner.replay) == len(first.learner.replay) > 0
-    assert torch.equal(next_one.learner.replay.rows[:], first.learner.replay.rows[:])
+    assert (next_one.learner.replay.buffer[:] == first.learner.replay.buffer[:]).all()
     assert next_one.learner.steps == 0
 
 
@@ -188,7 +166,7 @@ def test_faulty_transitions_never_reach_the_replay(tmp_path: Path) -> None:
     run = tiny_run(tmp_path, environment=tiny_environment(fault=0.2), agent_settings={"n_step": 3})
     finish(run)
     assert run.learner.episodes.faulty > 0
-    assert torch.isfinite(run.learner.replay.rows[:]).all()
+    assert all(part.isfinite().all() for part in run.learner.replay.state_dict()["transitions"])
     assert run.learner.replay.buffer.write_count + run.learner.episodes.faulty == run.learner.steps
 
 

@@ -12,14 +12,14 @@ from typing import Any
 
 import pytest
 import torch
+from torchrl.envs import TransformedEnv
 
-from tactile_cube.training.collection import CollectionError, MultiSyncCollection
+from tactile_cube.training.collection import CollectionError
 from tactile_cube.training.run import Run, train_on
-from tactile_cube.training.worker_process import Background
-from tests.training.tiny_env import TinyEnv, tiny_environment
+from tests.training.tiny_env import TinyEnv, tiny_environment, tiny_world
 from tests.training.tiny_run import finish, tiny_run, weights
 
-COLLECTOR = {"kind": "multi_sync", "processes": 2, "timeout": 15.0}
+COLLECTOR = {"kind": "multi_sync", "processes": 2, "timeout": 3.0, "start_timeout": 10.0}
 
 
 class FaultyEnv(TinyEnv):
@@ -53,8 +53,6 @@ def disturbed(folder: Path, at: int, disturb: Any, environment: Any = None) -> R
 
     def build() -> Run:
         run = tiny_run(folder, collector=COLLECTOR, environment=environment)
-        run.learner.collection._timeout = 3.0  # type: ignore[attr-defined]
-        run.learner.collection._start_timeout = 10.0  # type: ignore[attr-defined]
         iterate = run.learner.iterate
 
         def disturbed_iterate() -> None:
@@ -104,16 +102,13 @@ def test_a_run_that_starts_over_does_so_once(tmp_path: Path, reference: torch.Te
 
 
 def test_ctrl_c_while_workers_start_leaves_none_of_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    class Waiting:
-        def result(self, timeout: float) -> None:
-            raise KeyboardInterrupt
+    def interrupted(*_: Any) -> None:
+        raise KeyboardInterrupt
 
-    monkeypatch.setattr(Background, "submit", lambda self, call: Waiting())
-    killed = list[bool]()
-    monkeypatch.setattr(MultiSyncCollection, "_kill", lambda self: killed.append(True))
+    monkeypatch.setattr("tactile_cube.training.collection.wait", interrupted)
     with pytest.raises(KeyboardInterrupt):
         tiny_run(tmp_path, collector=COLLECTOR)
-    assert killed
+    assert not multiprocessing.active_children()
 
 
 def test_a_run_whose_workers_are_ended_with_it_ends_and_goes_on_later(tmp_path: Path, reference: torch.Tensor) -> None:
@@ -140,7 +135,7 @@ def test_a_world_that_fails_once_is_replaced(tmp_path: Path, reference: torch.Te
     asks = tmp_path / "asks"
     environment = tiny_environment()
     environment = type(environment)(
-        partial(FaultyEnv, asks=asks), environment.sizes, environment.terms, environment.reward_weights
+        partial(tiny_world, kind=FaultyEnv, asks=asks), environment.sizes, environment.terms, environment.reward_weights
     )
     run = disturbed(tmp_path / "run", 6, lambda _: asks.write_text(wish), environment)
     assert torch.equal(weights(run), reference)
@@ -157,11 +152,11 @@ def test_a_fault_that_comes_again_ends_the_run_with_its_reason(
 
 
 def test_a_worker_stopped_while_it_starts_is_given_up_and_leaves_nothing_behind(tmp_path: Path) -> None:
-    def stopped(worlds: int, seed: int) -> TinyEnv:
+    def stopped(worlds: int, seed: int) -> TransformedEnv:
         if not (tmp_path / "once").exists():
             (tmp_path / "once").touch()
             os.kill(os.getpid(), signal.SIGSTOP)
-        return TinyEnv(worlds, seed)
+        return tiny_world(worlds, seed)
 
     environment = tiny_environment()
     environment = type(environment)(stopped, environment.sizes, environment.terms, environment.reward_weights)
@@ -176,11 +171,11 @@ def trained_through(phase: str, folder: Path) -> None:
     gc.disable()  # what is left over then waits for the end of the program, as it may in any
     once, main = folder / "once", os.getpid()
 
-    def killed_at_its_start(worlds: int, seed: int) -> TinyEnv:
+    def killed_at_its_start(worlds: int, seed: int) -> TransformedEnv:
         if phase == "start" and seed == 0 and os.getpid() != main and not once.exists():
             once.touch()
             os.kill(os.getpid(), signal.SIGKILL)
-        return TinyEnv(worlds, seed)
+        return tiny_world(worlds, seed)
 
     def build() -> Run:
         run = tiny_run(folder / "run", collector=COLLECTOR | {"start_timeout": 5.0}, environment=environment)

@@ -53,35 +53,42 @@ def test_more_steps_starting_over_a_damaged_file_or_a_lost_policy_do_not_find_it
 
 def test_costs_add_up_over_sessions(tmp_path: Path) -> None:
     for expected in (100.0, 200.0):
-        Ledger(tmp_path / LEDGER, processes=2, simulating=lambda: 100.0, in_process=False).write(steps=7)
+        Ledger(tmp_path / LEDGER, simulating=lambda: 100.0, in_process=False).write(steps=7)
         assert json.loads((tmp_path / LEDGER).read_text())["seconds"]["simulating"] == pytest.approx(expected)
 
 
-@pytest.mark.parametrize(("in_process", "learning", "waiting"), [(False, 2.0, 20.0), (True, 1.5, 20.5)])
-def test_what_neither_workers_nor_learner_used_of_the_cores_is_waiting(
-    tmp_path: Path, in_process: bool, learning: float, waiting: float, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(("in_process", "learning"), [(False, 2.0), (True, 1.5)])
+def test_what_is_simulated_in_the_learners_process_is_counted_once(
+    tmp_path: Path, in_process: bool, learning: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / LEDGER).write_text("{")  # a damaged one counts for nothing
     clocks = SimpleNamespace(perf_counter=iter([100.0, 107.5]).__next__, process_time=iter([30.0, 32.0]).__next__)
     monkeypatch.setattr("tactile_cube.training.ledger.time", clocks)
-    costs = Ledger(tmp_path / LEDGER, processes=3, simulating=lambda: 0.5, in_process=in_process).costs()
-    assert costs == Costs(simulating=0.5, learning=learning, waiting=waiting, wall=7.5)
+    costs = Ledger(tmp_path / LEDGER, simulating=lambda: 0.5, in_process=in_process).costs()
+    assert costs == Costs(simulating=0.5, learning=learning, wall=7.5)
 
 
 def test_line_says_steps_rates_angle_curriculum_and_time_left(monkeypatch: pytest.MonkeyPatch) -> None:
-    clock = iter([100.0, 101.0, 110.0, 120.0])
+    clock = iter([100.0, 101.0, 110.0, 115.0, 120.0, 1000.0, 1005.0])
     monkeypatch.setattr(loggers.time, "perf_counter", lambda: next(clock))
     stream = io.StringIO()
-    line = ProgressLine(total=10_000, steps=1000, updates=50, usual=7000, stream=stream)
+    reference = ((2000, 0.5, 1.0), (7000, 2.0, 4.0))
+    line = ProgressLine(total=10_000, steps=1000, updates=50, reference=reference, stream=stream)
     summary = {"final_angle": 1.234, "episode_length": 88.0, "ended_time_limit": 0.9}
     line.stage, line.later = "stage 1 of 2", 3000
     line.show(1010, 51, summary, {"T_s": 0.25})
     assert stream.getvalue() == ""  # too soon
     line.show(4000, 1050, summary, {"T_s": 0.25})
     assert stream.getvalue() == (
-        "stage 1 of 2 |      4.0 k of 10 k steps |  300 steps/s  100 updates/s | final angle  1.23 rad,  88 steps | "
-        "90 % kept | T_s 0.25 | usually 0 min 20 s left\n"
+        "stage 1 of 2 |      4.0 k of 10 k steps |  300 steps/s  100 updates/s | final angle  1.23 rad (recorded "
+        "runs 1.10 to 2.20),  88 steps | 90 % kept | T_s 0.25 | usually 0 min 20 s left\n"
     )
+    line.show(4000, 1050, summary, {"T_s": 0.25})  # a busy machine: no step for five seconds
+    assert stream.getvalue().endswith("usually 0 min 30 s left\n")
     line.later = 0
     line.show(12_000, 3000, summary, {"T_s": 0.25})  # the last barrier lies beyond the end
     assert stream.getvalue().endswith("at most 0 min 00 s left\n")
+    assert stream.getvalue().count("recorded runs") == 2
+    line.show(12_000, 3000, summary, {"T_s": 0.25})
+    line.show(12_000, 3000, summary, {"T_s": 0.25})
+    assert stream.getvalue().endswith("time left unknown\n")

@@ -6,11 +6,13 @@ from typing import Any
 import torch
 from tensordict import TensorDict, TensorDictBase
 from torchrl.data import Bounded, Categorical, Composite, Unbounded
-from torchrl.envs import EnvBase
+from torchrl.envs import EnvBase, TransformedEnv
+from torchrl.envs.transforms import Compose
 
 from tactile_cube.agent.networks import Sizes
 from tactile_cube.env import Conditions
 from tactile_cube.training.build import Environment
+from tactile_cube.transforms import Curriculum, Ramps
 
 SIZES = Sizes(observation=6, privileged=3, action=2)
 TERMS = ("push", "lost")
@@ -40,12 +42,8 @@ class TinyEnv(EnvBase):
         self._fail_at, self._fault, self._calls = fail_at, fault, 0
         self._theta = torch.zeros(n, 1)
         self._count = torch.zeros(n, 1, dtype=torch.int64)
-        self.scale = 1.0
+        self.conditions = self.final_conditions = Conditions(filter_time=0.12, gravity_scale=1e6 + 1, penalty_scale=1.0)
         self.set_seed(seed)
-
-    def set_progress(self, environment_steps: int, performance: float) -> Conditions:
-        self.scale = 1.0 + environment_steps / 1000.0
-        return Conditions(filter_time=0.12, gravity_scale=self.scale, penalty_scale=1.0)
 
     def _set_seed(self, seed: int | None) -> None:
         torch.manual_seed(seed or 0)
@@ -65,7 +63,7 @@ class TinyEnv(EnvBase):
         mask = torch.ones_like(self._count, dtype=torch.bool)
         if tensordict is not None and "_reset" in tensordict:
             mask = tensordict["_reset"].reshape(mask.shape)
-        fresh = self.scale * 0.1 * torch.randn_like(self._theta)
+        fresh = self.conditions.gravity_scale * 0.1 * torch.randn_like(self._theta)
         self._theta = torch.where(mask, fresh, self._theta)
         self._count = torch.where(mask, 0, self._count)
         nothing = {"faulty": torch.zeros_like(mask), "reward_terms": torch.zeros(*mask.shape[:1], len(TERMS))}
@@ -98,5 +96,11 @@ def tiny_weights(conditions: Conditions) -> torch.Tensor:
     return torch.tensor([1.0, 0.5])
 
 
+def tiny_world(worlds: int, seed: int, kind: type[TinyEnv] = TinyEnv, **options: Any) -> TransformedEnv:
+    """Starts that scatter more and more: by 0.1 at first, by 0.1 more every 1000 steps."""
+    ramps = Ramps(low=0, high=1e9, filter_time=None, gravity_scale=1.0)
+    return TransformedEnv(kind(worlds, seed, **options), Compose(Curriculum(ramps)))
+
+
 def tiny_environment(**options: Any) -> Environment:
-    return Environment(partial(TinyEnv, **options), SIZES, TERMS, tiny_weights)
+    return Environment(partial(tiny_world, **options), SIZES, TERMS, tiny_weights)

@@ -7,7 +7,6 @@ import torch
 
 from tactile_cube.agent.plain_sac import PlainSac
 from tactile_cube.training.build import Environment, build_run
-from tactile_cube.training.loggers import CsvLogger
 from tactile_cube.training.run import Run
 from tactile_cube.training.settings import CollectorSettings, TrainingSettings
 from tests.training.tiny_env import tiny_environment
@@ -42,7 +41,6 @@ def tiny_run(
         lambda sizes: agent(sizes, **settings),
         CollectorSettings(**({"kind": "single", "worlds": 4, "processes": 1, "timeout": 30.0} | (collector or {}))),
         TrainingSettings(**(SCHEDULE | training)),
-        {"csv": CsvLogger},
         {"seed": seed, "agent": {k: str(v) for k, v in settings.items()}, "training": SCHEDULE | training},
     )
 

@@ -8,11 +8,10 @@ from hydra.errors import InstantiationException
 from hydra.utils import instantiate
 
 from tactile_cube.composition import CONFIG, composed
-from tactile_cube.curriculum import LinearCurriculum
 from tactile_cube.env import Reward, Task
 from tactile_cube.errors import InputError
 from tactile_cube.randomization import StartStates
-from tactile_cube.transforms import EnvConfig, make_env
+from tactile_cube.transforms import EnvConfig, Ramps, make_env
 from tests.meshes import CUBE, write_obj
 
 GROUPS = {
@@ -46,7 +45,7 @@ def test_option_makes_an_environment_that_runs(group: str, option: str) -> None:
     env = make_env(config, worlds=1, seed=0)
     data = env.rollout(2)
     assert not data["next", "faulty"].any()
-    assert set(env.set_progress(3_000_000, 2.5).columns()) == {"T_s", "gravity", "penalty"}
+    assert set(env.transform[0].set_progress(3_000_000, 2.5).columns()) == {"T_s", "gravity", "penalty"}
     env.close()
 
 
@@ -74,7 +73,7 @@ def test_published_options_equal_the_published_defaults_of_the_code() -> None:
     assert config.task == Task("full")
     assert config.reward == Reward()
     assert config.start == StartStates()
-    assert config.curriculum == LinearCurriculum()
+    assert config.curriculum == Ramps()
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,7 @@ def run(env: TransformedEnv, worlds: int, steps: int) -> torch.Tensor:
 def test_only_the_given_part_of_the_episodes_explores(transformed: MakeEnv) -> None:
     env = transformed(FingerExploration(Exploration(episodes=0.3)), worlds=200)
     taken = run(env, 200, 20)
-    exploring = env.transform._exploring.flatten()
+    exploring = env.transform._state["exploring"].flatten()
     assert float(exploring.float().mean()) == pytest.approx(0.3, abs=0.08)
     assert (taken[:, ~exploring] == 0.0).all()
     assert (taken[:, exploring] != 0.0).any()
@@ -69,7 +69,7 @@ def test_a_gait_acts_in_demonstrations_and_the_policy_takes_over_for_stretches(t
     explore = Exploration(episodes=0.0, probability=0.1, demonstrations=0.5, noise=0.0)
     env = transformed(FingerExploration(explore, gaits), worlds=100)
     taken = run(env, 100, 30)
-    shows = env.transform._exploring.flatten()
+    shows = env.transform._state["exploring"].flatten()
     assert float(shows.float().mean()) == pytest.approx(0.5, abs=0.15)
     assert (taken[:, ~shows] == 0.0).all()
     gait = taken[:, shows, 0, 0]

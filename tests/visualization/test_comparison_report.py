@@ -17,12 +17,10 @@ from tactile_cube.measurement.comparing.error import ErrorSummary
 from tactile_cube.measurement.comparing.noise_floor import noise_floor
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.units import of_joint
-from tactile_cube.visualization.charts import MEASURED
+from tactile_cube.visualization.charts import MEASURED, band, overlay
 from tactile_cube.visualization.comparison_episode import trial_starts, write_comparison
-from tactile_cube.visualization.comparison_figures import band, overlay
 from tactile_cube.visualization.comparison_report import comparison_report, summary
-from tactile_cube.visualization.diagnosis_report import diagnosis_report, identification_report
-from tactile_cube.visualization.diagnosis_sections import stage_section
+from tactile_cube.visualization.diagnosis_report import diagnosis_report, identification_report, stage_section
 from tactile_cube.visualization.report import Report, Section, Table, write_report
 from tests.identification.easy_safety import half_used
 from tests.measurement.small_rig import URDF, write

@@ -15,6 +15,7 @@ from tactile_cube.errors import InputError
 from tactile_cube.measurement.sources.log_file import READERS
 from tactile_cube.workbench import importing
 from tactile_cube.workbench.importing import LOGS, Waiting, import_logs, kept, settings_of
+from tactile_cube.workbench.state import Workbench
 from tests.measurement.small_rig import URDF, table
 from tests.measurement.sources.bare_joint import played
 
@@ -181,7 +182,27 @@ def test_two_gains_of_one_joint_are_refused_and_named(tmp_path: Path) -> None:
         import_logs(tmp_path / "out", given)
 
 
+@pytest.mark.parametrize("length", [0.0, 1e-9, -1.0])
+def test_trials_of_no_length_are_refused(tmp_path: Path, length: float) -> None:
+    polars.DataFrame(played("pendulum")).write_csv(tmp_path / "run.csv")
+    given = Waiting((tmp_path / "run.csv",), robot="wheel").settings | {"length": length}
+    with pytest.raises(InputError, match=rf"source.length={length:g}: pieces need 20 rows"):
+        import_logs(tmp_path / "out", given)
+
+
+def test_a_log_without_motion_is_refused_before_anything_is_fitted(tmp_path: Path) -> None:
+    log = {name: 0.0 * values if name != "time" else values for name, values in played("wheel").items()}
+    for k in range(2):
+        polars.DataFrame(log).write_csv(tmp_path / f"run_{k}.csv")
+    given = Waiting((tmp_path / "run_0.csv", tmp_path / "run_1.csv"), robot="wheel").settings
+    recording, _ = import_logs(tmp_path / "out", given)
+    with pytest.raises(InputError, match=r"out: no joint moves in any trial; record motion"):
+        Workbench(recording)
+
+
 def test_what_is_typed_and_no_number_is_named() -> None:
+    with pytest.raises(InputError, match=r"^initialisation: '0 1.5': give a whole number for each file"):
+        settings_of({"initialisation": "0 1.5"})
     for text in ("4.O", "1,,x", "${oc.env:HOME}", ""):
         with pytest.raises(InputError, match=r"^kp: .* is no number"):
             settings_of({"controller.kp": text})

@@ -72,11 +72,6 @@ class PlainSac(Agent):
         """The plain loss."""
         return PlainLoss(self.actor, critics, self.settings).to(self.device)
 
-    def losses(self, batch: TensorDictBase) -> dict[str, Tensor]:
-        """See `PlainLoss`."""
-        losses: dict[str, Tensor] = self.loss(batch)
-        return losses
-
     def follow(self) -> None:
         """By tau."""
         self.loss.follow()

@@ -12,6 +12,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
+import re
 import subprocess
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -32,6 +33,8 @@ if TYPE_CHECKING:
 
 FORMAT = "tactile_cube policy 2"
 NO_DIGEST = b"0" * 64
+KEPT = re.compile(r"policy_(\d+)\.safetensors")
+"""Policies that a run keeps each `training.policy_every` steps."""
 LARGEST, LARGEST_HEADER = 1 << 28, 1 << 22
 """Bytes of a file and of its header; the shipped policies have 1.4 million and some thousand."""
 WIDEST, DEEPEST = 1 << 16, 32
@@ -213,3 +216,45 @@ def _require(path: Path, tensors: Mapping[str, Array], shapes: Mapping[str, Sequ
             raise InputError(f"{path}: {key} holds {found.dtype}, expected float32")
         if not np.isfinite(found).all():
             raise InputError(f"{path}: {key} holds values that are not finite")
+
+
+def kept_policies(run: Path, last: int) -> list[Path]:
+    """The last policies that a run has kept, the oldest first.
+
+    Raises:
+        InputError: there is no such folder, or it has fewer of them.
+    """
+    if not run.is_dir():
+        raise InputError(f"run={run}: no such folder; give that of a training run")
+    steps = {path: int(found[1]) for path in run.iterdir() if (found := KEPT.fullmatch(path.name))}
+    kept = sorted(steps, key=lambda path: steps[path])
+    if not 1 <= last <= len(kept):
+        raise InputError(
+            f"last={last}: {run} has {len(kept)} kept policies (policy_STEPS.safetensors); ask for 1 to {len(kept)}, "
+            "or train with a smaller training.policy_every"
+        )
+    return kept[-last:]
+
+
+def averaged(files: Sequence[Path]) -> tuple[Actor, PolicyInfo]:
+    """An actor with the mean of the weights in policy files, described as the last of them.
+
+    A policy that learns all the time sways about what is best; the mean over its way stands nearer to it. Source:
+    Izmailov et al., *Averaging Weights Leads to Wider Optima and Better Generalization*, UAI 2018.
+
+    Raises:
+        InputError: a file is damaged, or not of the size of the last one.
+    """
+    loaded = [load_actor(file) for file in files]
+    actor, info = loaded[-1]
+    for file, (_, other) in zip(files, loaded, strict=True):
+        if (other.observation_size, other.hidden) != (info.observation_size, info.hidden):
+            raise InputError(
+                f"{file}: its layers have other sizes than those of {files[-1]}; average one run's policies"
+            )
+    import torch  # as in load_actor
+
+    with torch.no_grad():
+        for weights in zip(*(other.parameters() for other, _ in loaded), strict=True):
+            weights[-1].copy_(torch.stack(list(weights)).mean(0))
+    return actor, info.model_copy(update={"averaged": tuple(other.steps for _, other in loaded), "performance": None})

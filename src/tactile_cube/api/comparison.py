@@ -9,7 +9,7 @@ from omegaconf import OmegaConf
 
 from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
 from tactile_cube.drivetrain.model_file import ModelFile, as_model
-from tactile_cube.errors import warn
+from tactile_cube.errors import InputError, warn
 from tactile_cube.identification.contact.grasps import compare_contact
 from tactile_cube.measurement.bench import has_free_motion, with_object, without_touches
 from tactile_cube.measurement.comparing.comparison import USUAL_STEP, Comparison, compare_recording, comparison_json
@@ -46,7 +46,24 @@ def record(
 
 def run_recording(job: Job) -> dict[str, Recording]:
     """Write what a job's source gives."""
-    out = Path(job.config.out)
+    return _imported(job, Path(job.config.out))
+
+
+def opened_or_imported(job: Job, recording: Recording | PathLike | None) -> Recording:
+    """The recording, or what a job's source of logs gives, which is written into its folder.
+
+    Raises:
+        InputError: neither of them, or both.
+    """
+    if (recording is None) == (job.config.get("source") is None):
+        raise InputError(
+            "give either recording=FOLDER (of a recording.yaml) or logs to import: source=csv source.files=LOGS "
+            "source.urdf=FILE"
+        )
+    return _imported(job, job.folder / "recording")[""] if recording is None else opened(recording)
+
+
+def _imported(job: Job, out: Path) -> dict[str, Recording]:
     require_free(out)
     settings: Any = OmegaConf.to_container(job.config.source, resolve=True)
     tables = recording_tables(settings, str(job.choices["source"]), job.config.seed)

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
-from tactile_cube.api.comparison import modelled, opened
+from tactile_cube.api.comparison import modelled, opened, opened_or_imported
 from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
 from tactile_cube.drivetrain.effects import catalogue, find_effect
 from tactile_cube.drivetrain.model_file import ModelFile, write_model
@@ -96,8 +96,9 @@ class DiagnosisResult:
 
 @as_input_errors
 def diagnose(
-    recording: Recording | PathLike,
+    recording: Recording | PathLike | None = None,
     *,
+    source: str | None = None,
     model: ModelFile | PathLike | None = None,
     effects: Sequence[str] | None = None,
     criteria: str | None = None,
@@ -110,12 +111,13 @@ def diagnose(
 
     Args:
         recording: what was measured, or its folder; two or more trials.
+        source: in its place, option of conf/source by which logs are imported into the run's folder.
         model: to begin with, or its file: what else is missing? None: what the recording states.
         effects: effects of your own beside the catalogue, as dotted paths.
         criteria: option of conf/criteria, what decides the answer.
         step: simulation step of the errors that are stated [s].
         seed: which trials are held out.
-        values: other keys of the configuration, e.g. {"criteria.adequate": 1.5}.
+        values: other keys of the configuration, e.g. {"criteria.adequate": 1.5, "source.files": ["log.csv"]}.
         say: takes lines of progress; None: stderr.
 
     Raises:
@@ -130,10 +132,10 @@ def diagnose(
 
 
 def run_diagnosis(
-    job: Job, recording: Recording | PathLike, known: ModelFile | PathLike | None, say: Say | None = None
+    job: Job, recording: Recording | PathLike | None, known: ModelFile | PathLike | None, say: Say | None = None
 ) -> DiagnosisResult:
     """Diagnose free motion, grasps, or both, as the recording has them."""
-    say, known, recording = say or job.say, modelled(known), opened(recording)
+    say, known, recording = say or job.say, modelled(known), opened_or_imported(job, recording)
     if known is not None:
         require_same_joints(recording, known)
     if with_object(recording).trials and not has_free_motion(recording):

@@ -67,7 +67,9 @@ def effects(name: str | None = None) -> tuple[EffectDescription, ...]:
     if name is None:
         return tuple(_described(kind) for kind in known.values())
     if name not in known:
-        raise InputError(f"effect '{name}' is unknown; choose one of: {', '.join(known)}{suggestion(name, known)}")
+        raise InputError(
+            f"effect '{name}' is unknown{suggestion(name, known) or f'; choose one of {chr(44).join(known)}'}"
+        )
     return (_described(known[name]),)
 
 

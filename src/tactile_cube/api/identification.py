@@ -70,8 +70,7 @@ class IdentificationResult:
 
     def _free_page(self, folder: Path, path: str, found: Identification) -> Any:
         from tactile_cube.visualization.comparison_episode import write_comparison
-        from tactile_cube.visualization.diagnosis_report import identification_report
-        from tactile_cube.visualization.diagnosis_sections import held_section
+        from tactile_cube.visualization.diagnosis_report import held_section, identification_report
 
         config, recording = self.job.config, without_touches(self.recording)
         after = compare_recording(recording, self.model, config.step, floor=found.floor)

@@ -5,7 +5,7 @@ import hashlib
 import io
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -13,8 +13,7 @@ from typing import Any, Literal, NamedTuple
 from hydra.utils import instantiate
 from omegaconf import OmegaConf
 
-from tactile_cube.agent.averaging import averaged, kept_policies
-from tactile_cube.agent.policy_file import save_policy
+from tactile_cube.agent.policy_file import averaged, kept_policies, save_policy
 from tactile_cube.api.environment import grasps_of
 from tactile_cube.api.evaluation import run_evaluation
 from tactile_cube.api.job import Job, PathLike, as_input_errors, as_word, called_job, worded_job
@@ -178,8 +177,8 @@ def _training_run(job: Job, plain: dict[str, Any], stage: str, later: int, **cha
         training=TrainingSettings(
             **plain["training"] | {"init_from": networks_path(config.training.init_from)} | changes
         ),
-        loggers={name: instantiate(entry, _partial_=True) for name, entry in config.logger.items()},
         config=plain,
+        logger=plain["logger"],
         make_replay=instantiate(config.replay),
     )
     run.line.stage, run.line.later = stage, later
@@ -191,7 +190,7 @@ def _in_stages(job: Job, plain: dict[str, Any]) -> TrainingResult:
     stages, results = stages_of(job), list[TrainingResult]()
     settings = [TrainingSettings(**dict(stage.config.training)) for stage in stages]
     for number, stage in enumerate(stages):
-        goal, later = settings[number].goal, sum(one.usual_steps or one.steps for one in settings[number + 1 :])
+        goal, later = settings[number].goal, sum(one.usual_steps for one in settings[number + 1 :])
         title = f"stage {number + 1} of {len(stages)}, {stage.folder.name}{f', until {goal}' if goal else ''}"
         print(f"{_overview(stages, results)}\n{title}", flush=True)
         results.append(run_training(stage, title, later))
@@ -269,8 +268,7 @@ def _own_grasps(job: Job, file: Path) -> str | None:
 
 
 def _sum_up(folder: Path, results: Sequence[TrainingResult]) -> None:
-    costs = [asdict(read_costs(result.folder / LEDGER)) for result in results]
-    spent = Costs(**{name: sum(one[name] for one in costs) for name in costs[0]})
+    spent = sum((read_costs(result.folder / LEDGER) for result in results), Costs())
     write_costs(folder / LEDGER, sum(result.steps for result in results), spent)
     _write_joined_curve([result.folder / "metrics.csv" for result in results], folder / "metrics.csv")
 

@@ -3,16 +3,6 @@
 from tactile_cube.env.cube_pose import CubePose, cube_pose
 from tactile_cube.env.reward import Reward
 from tactile_cube.env.rotation import RotationEnv, TimeStep
-from tactile_cube.env.task import OUTCOMES, Conditions, Curriculum, Task
+from tactile_cube.env.task import OUTCOMES, Conditions, Task
 
-__all__ = [
-    "OUTCOMES",
-    "Conditions",
-    "CubePose",
-    "Curriculum",
-    "Reward",
-    "RotationEnv",
-    "Task",
-    "TimeStep",
-    "cube_pose",
-]
+__all__ = ["OUTCOMES", "Conditions", "CubePose", "Reward", "RotationEnv", "Task", "TimeStep", "cube_pose"]

@@ -6,7 +6,6 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,13 +32,6 @@ class Conditions:
     def columns(self) -> dict[str, float]:
         """By the names that they have in logs: "T_s" [s], "gravity" and "penalty" (scales)."""
         return {"T_s": self.filter_time, "gravity": self.gravity_scale, "penalty": self.penalty_scale}
-
-
-class Curriculum(Protocol):
-    """Gives the conditions for the episodes that start now."""
-
-    def conditions(self, environment_steps: int, performance: float, final: Conditions) -> Conditions:
-        """Conditions after `environment_steps` with mean final angle `performance` [rad] on the way to `final`."""
 
 
 OUTCOMES = ("running", "time_limit", "dropped", "left_range", "tilted", "lifted", "faulty")

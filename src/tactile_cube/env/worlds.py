@@ -12,7 +12,7 @@ from torchrl.data import Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
 from tactile_cube.env.rotation import OBJECT, Array, RotationEnv, TimeStep
-from tactile_cube.env.task import FAULTY, OUTCOMES, Conditions, Curriculum
+from tactile_cube.env.task import FAULTY, OUTCOMES, Conditions
 
 
 class WorldsEnv(EnvBase):  # type: ignore[misc]
@@ -28,14 +28,13 @@ class WorldsEnv(EnvBase):  # type: ignore[misc]
         torch.Size([2, 100, 1])
     """
 
-    def __init__(self, tasks: Sequence[RotationEnv], curriculum: Curriculum | None = None) -> None:
-        """Hosts `tasks`; a `curriculum` changes their conditions as learning goes on (set_progress)."""
+    def __init__(self, tasks: Sequence[RotationEnv]) -> None:
+        """Hosts `tasks`."""
         super().__init__(device="cpu", batch_size=[len(tasks)])
         self.tasks = list(tasks)
-        self.curriculum = curriculum
+        self.final_conditions = self.tasks[0].task.conditions()
         self._time_steps: list[TimeStep] = []
         self._make_specs()
-        self.set_progress(0, 0.0)
         self._seed_tasks(0)
 
     def _make_specs(self) -> None:
@@ -55,24 +54,25 @@ class WorldsEnv(EnvBase):  # type: ignore[misc]
         flag = Categorical(2, shape=(n, 1), dtype=torch.bool)
         self.done_spec = Composite(done=flag, terminated=flag.clone(), truncated=flag.clone(), shape=(n,))
 
-    def set_progress(self, environment_steps: int, performance: float, odds: Array | None = None) -> Conditions:
-        """Sets the conditions of the episodes that start from now on.
+    @property
+    def conditions(self) -> Conditions:
+        """Of the episodes that start from now on."""
+        return self.tasks[0].conditions
 
-        Args:
-            environment_steps: steps taken so far by all worlds of the training together.
-            performance: mean final angle of recent episodes [rad].
-            odds: of the parts of the ranges of steered constants; None: as they are.
-
-        Returns:
-            The conditions in force.
-        """
-        conditions = self.tasks[0].task.conditions()
-        if self.curriculum is not None:
-            conditions = self.curriculum.conditions(environment_steps, performance, conditions)
+    @conditions.setter
+    def conditions(self, conditions: Conditions) -> None:
         for task in self.tasks:
             task.conditions = conditions
-            task.odds = task.odds if odds is None else odds
-        return conditions
+
+    @property
+    def odds(self) -> Array:
+        """Of the parts of the ranges of steered constants, in the episodes that start from now on."""
+        return self.tasks[0].odds
+
+    @odds.setter
+    def odds(self, odds: Array) -> None:
+        for task in self.tasks:
+            task.odds = odds
 
     def _set_seed(self, seed: int | None) -> None:
         """Seeds every world, and the generator that the transforms draw from."""

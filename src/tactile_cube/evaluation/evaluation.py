@@ -20,10 +20,9 @@ from tactile_cube.env import RotationEnv, Task
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.episode_record import EpisodeRecord
 from tactile_cube.evaluation.policies import Policy, PolicySource, ReplayPolicy
-from tactile_cube.evaluation.protocol import Protocol
+from tactile_cube.evaluation.protocol import NumbPolicy, Protocol, Variant
 from tactile_cube.evaluation.rollout import run_episode
 from tactile_cube.evaluation.summary import Summary, drawn, lost_where, sentence, summarise
-from tactile_cube.evaluation.variant import NumbPolicy, Variant
 from tactile_cube.evaluation.verdict import EpisodeResult, judge_episode
 from tactile_cube.simulation import Start
 from tactile_cube.simulation.health import unresolved_among
@@ -47,11 +46,10 @@ class VariantResult:
     def as_dict(self) -> dict[str, object]:
         """Return plain data for JSON."""
         varied = drawn(self.results)
-        episodes = [one.as_dict() | {"world": {name: one.world[name] for name in varied}} for one in self.results]
         return {
             "variant": asdict(self.variant),
             "summary": asdict(self.summary),
-            "episodes": episodes,
+            "episodes": [one.as_dict() | {"world": {key: one.world[key] for key in varied}} for one in self.results],
             "lost_where": [asdict(one) for one in lost_where(self.results)],
             "unresolved": self.unresolved,
         }
@@ -116,8 +114,8 @@ class Evaluation:
         return NumbPolicy(self._policy, variant.numb, self.hand) if variant.numb else self._policy
 
     def _run_variant(self, variant: Variant, report: Report) -> VariantResult:
-        env = make_env(variant.apply(self._config), 1, self._seed, evaluation=True)
-        policy, seeds = self._feeling(variant), [episode_seed(self._seed, k) for k in range(self.protocol.episodes)]
+        env, policy = make_env(variant.apply(self._config), 1, self._seed, evaluation=True), self._feeling(variant)
+        seeds = [episode_seed(self._seed, number) for number in range(self.protocol.episodes)]
         episodes = ((seed, run_episode(env, policy, seed, variant.pull)) for seed in seeds)
         return self._judged(variant, env, episodes, report)
 
@@ -182,12 +180,7 @@ class DisplacedStart:
             return
         world = env.world
         turned = self._turn * Rotation.from_quat(world.cube_quaternion)
-        start = Start(
-            angles=np.array(world.q),
-            cube_position=np.array(world.cube_position) + self._shift,
-            cube_quaternion=turned.as_quat(),
-        )
-        world.reset(env.constants, start)
+        world.reset(env.constants, Start(np.array(world.q), world.cube_position + self._shift, turned.as_quat()))
 
 
 FORMAT = "tactile_cube results 1"

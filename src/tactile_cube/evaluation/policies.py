@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
@@ -28,20 +28,18 @@ class Policy(Protocol):
     """Chooses the action of each policy step."""
 
     def start(self, env: RotationEnv, seed: int) -> None:
-        """Begin an episode that has just been reset."""
+        """Begin an episode that has just been reset; by default there is nothing to prepare."""
+        return
 
     def act(self, observation: NDArray[np.float32], step: int) -> Array:
         """Return the action `(joints,)` in [-1, 1] for the stacked observation."""
 
 
-class ActorPolicy:
+class ActorPolicy(Policy):
     """A trained actor without exploration: the same observation always gives the same action."""
 
     def __init__(self, actor: Actor) -> None:
         self._actor = actor
-
-    def start(self, env: RotationEnv, seed: int) -> None:
-        """Nothing to prepare: the actor has no memory beyond the stacked observation."""
 
     def act(self, observation: NDArray[np.float32], step: int) -> Array:
         """Return tanh of the actor's mean."""
@@ -112,11 +110,7 @@ class ScriptedPolicy:
         return self._gait.action(self._hand, step, self._direction)
 
 
-BASELINES: dict[str, type[HoldPolicy] | type[RandomPolicy] | type[ScriptedPolicy]] = {
-    "hold": HoldPolicy,
-    "random": RandomPolicy,
-    "scripted": ScriptedPolicy,
-}
+BASELINES: dict[str, Callable[[], Policy]] = {"hold": HoldPolicy, "random": RandomPolicy, "scripted": ScriptedPolicy}
 
 
 @dataclass(frozen=True)
@@ -155,7 +149,12 @@ def find_policy(name: str | None) -> PolicySource:
         return PolicySource(BASELINES[name](), name)
     kind, separator, place = (name or "").partition(":")
     if separator and kind == "scripted":
-        return PolicySource(ScriptedPolicy(_best_gait(Path(place))), f"scripted gait of {Path(place).name}")
+        try:
+            best = read_yaml(Path(place))["best"]
+            gait = Gait(**best | {"phases": tuple(best["phases"])})
+        except (KeyError, TypeError) as error:
+            raise InputError(f"policy=scripted:{place}: no gait of benchmarks.teacher (key 'best')") from error
+        return PolicySource(ScriptedPolicy(gait), f"scripted gait of {Path(place).name}")
     if separator and kind == "replay":
         record = EpisodeRecord.load(Path(place))
         if record.steps == 0:
@@ -164,18 +163,9 @@ def find_policy(name: str | None) -> PolicySource:
     path = policy_path(name)
     actor, info = load_actor(path)
     joints = info.action_size
-    reading = 2 * joints  # q_m and e_q
-    stack = max(1, info.observation_size // reading)
-    require_sizes(path, info, stack * reading, joints)
+    stack = max(1, info.observation_size // (2 * joints))  # of q_m and e_q
+    require_sizes(path, info, 2 * joints * stack, joints)
     shipped = path.parent == SHIPPED
     file, label = (path.name, path.stem) if shipped else (str(path), f"{path.resolve().parent.name}/{path.stem}")
     provenance = {"file": file, **info.model_dump(exclude={"config"})}
     return PolicySource(ActorPolicy(actor), label, provenance, info.config, stack, joints)
-
-
-def _best_gait(file: Path) -> Gait:
-    try:
-        best = read_yaml(file)["best"]
-        return Gait(**best | {"phases": tuple(best["phases"])})
-    except (KeyError, TypeError) as error:
-        raise InputError(f"policy=scripted:{file}: no gait of benchmarks.teacher (key 'best')") from error

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tactile_cube.composition import suggestion
 from tactile_cube.errors import InputError
-from tactile_cube.run_folder import CONFIGURATION
+from tactile_cube.run_folder import CHECKPOINT, CONFIGURATION
 
 BASELINES = ("hold", "random", "scripted", "scripted:GAIT.yaml", "replay:EPISODE.npz")
 """Names that are no files; evaluate knows them."""
@@ -57,9 +57,7 @@ def networks_path(name: str | None) -> str | None:
     Raises:
         InputError: there is no such file.
     """
-    from tactile_cube.training.checkpoint import FILE  # torch, which the robot's computer does without
-
     if name is None:
         return None
-    checkpoint = Path(name) / FILE if Path(name).is_dir() else Path(name)
+    checkpoint = Path(name) / CHECKPOINT if Path(name).is_dir() else Path(name)
     return str(checkpoint if checkpoint.is_file() else policy_path(name, "training.init_from"))

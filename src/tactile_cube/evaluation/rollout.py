@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,9 @@ from tactile_cube.transforms import JointOffset
 
 Interference = Callable[[RotationEnv, int], None]
 """Something done to the world before each policy step, given the number of the step."""
+NO_NUMBERS = ("effects", "joints", "object_shape")
+WORLD_SIGNALS = ("q", "q_f", "cube_position", "cube_quaternion")
+CONTACT_KINDS: dict[str, Any] = {"step": np.int64, "finger": np.int64, "tip": np.bool_}
 
 
 def run_episode(
@@ -58,52 +62,70 @@ class Recorder:
         offset = next(part.offset for part in env.transform if isinstance(part, JointOffset))
         self._task, self._joint_offset = task, np.broadcast_to(offset.double().numpy(), (1, task.hand.joints))[0]
         self._fingers = tuple(finger.name for finger in task.hand.fingers)
-        self._tips = [task.hand.fingers[finger].links[-1] for finger in range(len(self._fingers))]
-        self._rows: dict[str, list[Array]] = {name: [] for name in WORLD_SIGNALS}
-        self._contacts: list[tuple[int, int, bool, Array, Array, float, float]] = []
-        self._trace: list[dict[str, Array]] = []
-        self._theta, self._reward = [0.0], list[float]()
-        self._terms, self._targets = list[Array](), list[Array]()
+        self._samples = dict[str, list[Any]](theta=[0.0], **{name: [] for name in WORLD_SIGNALS})
+        self._steps: dict[str, list[Any]] = {"reward": [], "terms": [], "target": []}
         self._policy: dict[str, list[Array]] = {}
+        self._contacts: list[dict[str, Any]] = []
+        self._trace: list[dict[str, Any]] = []
         self._outcome = 0
         self._sample()
 
     def decided(self, observation: NDArray[np.float32], action: Array) -> None:
         """Take over what the policy was given, a stack of readings, and the action `(joints,)` it asked for."""
-        joints = self._task.hand.joints
-        newest = np.array(observation[-2 * joints :], dtype=np.float64)
-        values = (newest[:joints], newest[joints:], np.array(action, dtype=np.float64))
-        for name, value in zip(POLICY_SIGNALS, values, strict=True):
+        q_m, e_q = np.array(observation[-2 * self._task.hand.joints :], dtype=np.float64).reshape(2, -1)
+        for name, value in {"q_m": q_m, "e_q": e_q, "action": np.array(action, dtype=np.float64)}.items():
             self._policy.setdefault(name, []).append(value)
 
     def add(self, state: TensorDictBase) -> None:
         """Take over one policy step that has just been made."""
-        self._theta.append(float(state["theta"][0, 0]))
-        self._reward.append(float(state["reward"][0, 0]))
-        self._terms.append(state["reward_terms"][0].double().numpy())
-        self._targets.append(self._task.target + self._joint_offset)
+        self._samples["theta"].append(float(state["theta"][0, 0]))
+        self._steps["reward"].append(float(state["reward"][0, 0]))
+        self._steps["terms"].append(state["reward_terms"][0].double().numpy())
+        self._steps["target"].append(self._task.target + self._joint_offset)
         self._outcome = int(state["outcome"][0, 0])
         if self._task.world.options.trace:
             self._trace.append({name: np.array(values) for name, values in self._task.world.trace.items()})
         self._sample()
 
+    def _sample(self) -> None:
+        world, sample = self._task.world, len(self._samples["theta"]) - 1
+        for name in WORLD_SIGNALS:
+            self._samples[name].append(np.array(getattr(world, name)))
+        tips = {finger.name: finger.links[-1] for finger in self._task.hand.fingers}
+        self._contacts += [
+            {
+                "step": sample,
+                "finger": self._fingers.index(one.finger),
+                "tip": one.link == tips[one.finger],
+                "position": one.position,
+                "force": one.force * one.normal + one.friction,
+                "normal_force": one.force,
+                "distance": one.distance,
+            }
+            for one in world.contacts()
+            if one.other == "cube" and one.finger in tips
+        ]
+
     def record(self, seed: int) -> EpisodeRecord:
         """Return the episode so far."""
-        task, samples = self._task, len(self._theta)
+        task, samples = self._task, {name: np.array(rows) for name, rows in self._samples.items()}
         weights = task.reward.weights(task.conditions.penalty_scale)
-        terms = np.array(self._terms).reshape(-1, len(weights)) * weights
-        names = self._trace[0] if self._trace else {}
+        terms: Array = np.array(self._steps["terms"]).reshape(-1, len(weights)) * weights
+        table: dict[str, Any] = {field.name: [] for field in dataclasses.fields(ContactTable)}
+        for name in table:
+            column = np.array([one[name] for one in self._contacts], dtype=CONTACT_KINDS.get(name, np.float64))
+            table[name] = column.reshape(-1, 3) if name in ("position", "force") else column
         return EpisodeRecord(
-            time=np.arange(samples, dtype=np.float64) * task.world.options.policy_dt,
-            theta=np.array(self._theta),
-            joint_position=np.array(self._rows["q"]),
-            filtered_target=np.array(self._rows["q_f"]),
-            target=np.array(self._targets).reshape(-1, task.hand.joints),
-            cube_position=np.array(self._rows["cube_position"]),
-            cube_quaternion=np.array(self._rows["cube_quaternion"]),
-            reward=np.array(self._reward),
+            time=np.arange(len(samples["theta"]), dtype=np.float64) * task.world.options.policy_dt,
+            theta=samples["theta"],
+            joint_position=samples["q"],
+            filtered_target=samples["q_f"],
+            target=np.array(self._steps["target"]).reshape(-1, task.hand.joints),
+            cube_position=samples["cube_position"],
+            cube_quaternion=samples["cube_quaternion"],
+            reward=np.array(self._steps["reward"]),
             reward_terms={name: terms[:, index] for index, name in enumerate(task.reward.terms)},
-            contacts=self._contact_table(),
+            contacts=ContactTable(**table),
             ending=OUTCOMES[self._outcome],
             direction=task.task.direction,
             cube_size=np.array(task.constants.cube_size),
@@ -111,39 +133,9 @@ class Recorder:
             fingers=self._fingers,
             object_shape=task.constants.object_shape,
             axis=tuple(task.task.axis_vector().tolist()),
-            trace={name: np.concatenate([piece[name] for piece in self._trace]) for name in names},
+            trace={name: np.concatenate([one[name] for one in self._trace]) for name in (self._trace or [{}])[0]},
             policy={name: np.array(rows) for name, rows in self._policy.items()},
         )
-
-    def _sample(self) -> None:
-        world, sample = self._task.world, len(self._theta) - 1
-        for name, rows in self._rows.items():
-            rows.append(np.array(getattr(world, name)))
-        for contact in world.contacts():
-            if contact.other == "cube" and contact.finger in self._fingers:
-                force = contact.force * contact.normal + contact.friction
-                finger = self._fingers.index(contact.finger)
-                tip = contact.link == self._tips[finger]
-                self._contacts.append((sample, finger, tip, contact.position, force, contact.force, contact.distance))
-
-    def _contact_table(self) -> ContactTable:
-        step, finger, tip, position, force, normal, distance = (
-            zip(*self._contacts, strict=True) if self._contacts else ((),) * 7
-        )
-        return ContactTable(
-            step=np.array(step, dtype=np.int64),
-            finger=np.array(finger, dtype=np.int64),
-            tip=np.array(tip, dtype=np.bool_),
-            position=np.array(position, dtype=np.float64).reshape(-1, 3),
-            force=np.array(force, dtype=np.float64).reshape(-1, 3),
-            normal_force=np.array(normal, dtype=np.float64),
-            distance=np.array(distance, dtype=np.float64),
-        )
-
-
-NO_NUMBERS = ("effects", "joints", "object_shape")
-POLICY_SIGNALS = ("q_m", "e_q", "action")
-WORLD_SIGNALS = ("q", "q_f", "cube_position", "cube_quaternion")
 
 
 def _numbers(constants: EpisodeConstants) -> dict[str, float | str]:

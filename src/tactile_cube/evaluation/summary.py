@@ -10,8 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import mannwhitneyu
 
-from tactile_cube.evaluation.variant import UNCHANGED
+from tactile_cube.evaluation.protocol import UNCHANGED
 from tactile_cube.evaluation.verdict import SUCCESS, EpisodeResult, EpisodeVerdict
+
+NO_PROPERTY = ("seed", "force_seed")  # where random numbers come from: larger is not more of anything
+SIGNIFICANT = 0.05  # for all constants together: one false name in twenty evaluations
+LEAST = 5  # episodes lost and kept, below which no test can tell
 
 
 @dataclass(frozen=True)
@@ -25,6 +29,7 @@ class Summary:
         success_low: lower end of the 95 % interval of the success rate; `success_high`: upper end.
         kept: episodes that ended with the cube in the hand.
         rate: mean of final angle over duration [rad/s].
+        drift: median [m/s].
         verdicts: how often each verdict was given.
         exploits: how often each exploit was found.
     """
@@ -46,39 +51,41 @@ class Summary:
     link_contact: float
     link_force_share: float
     rise: float
+    drift: float
     reward_terms: dict[str, float]
     verdicts: dict[str, int]
     exploits: dict[str, int]
 
 
-LOWEST = 0.1
-AVERAGED = ("tip_support", "link_contact", "link_force_share", "rise")
-
-
 def summarise(results: Sequence[EpisodeResult]) -> Summary:
-    """Reduce episodes to a summary."""
+    """Return the numbers of a set of episodes."""
+
+    def mean(values: Sequence[float]) -> float:
+        return float(np.mean(values))
+
     angles = np.array([result.final_angle for result in results])
     successes = sum(result.success for result in results)
     low, high = wilson_interval(successes, len(results))
-    alike = {name: float(np.mean([getattr(one, name) for one in results])) for name in AVERAGED}
     return Summary(
         episodes=len(results),
         mean_angle=float(angles.mean()),
         std_angle=float(angles.std()),
         median_angle=float(np.median(angles)),
-        low_angle=float(np.quantile(angles, LOWEST)),
+        low_angle=float(np.quantile(angles, 0.1)),
         best_angle=float(angles.max()),
         successes=successes,
         success_means=SUCCESS,
         success_low=low,
         success_high=high,
         kept=sum(result.kept for result in results),
-        rate=float(np.mean([result.final_angle / max(result.duration, 1e-9) for result in results])),
-        finger_lifts=float(np.mean([sum(result.finger_lifts) for result in results])),
-        **alike,
-        reward_terms={
-            name: float(np.mean([result.reward_terms[name] for result in results])) for name in results[0].reward_terms
-        },
+        rate=mean([result.final_angle / max(result.duration, 1e-9) for result in results]),
+        finger_lifts=mean([sum(result.finger_lifts) for result in results]),
+        tip_support=mean([result.tip_support for result in results]),
+        link_contact=mean([result.link_contact for result in results]),
+        link_force_share=mean([result.link_force_share for result in results]),
+        rise=mean([result.rise for result in results]),
+        drift=float(np.median([result.drift for result in results])),
+        reward_terms={name: mean([one.reward_terms[name] for one in results]) for name in results[0].reward_terms},
         verdicts={verdict.value: sum(result.verdict == verdict for result in results) for verdict in EpisodeVerdict},
         exploits=dict(Counter(name for result in results for name in result.exploits)),
     )
@@ -125,19 +132,15 @@ def sentence(name: str, summary: Summary) -> str:
         f"{summary.mean_angle:.2f} +- {summary.std_angle:.2f}, best {summary.best_angle:.2f}\n"
         f"  three or more tips on the cube {100 * summary.tip_support:.0f} % of the time, another link "
         f"{100 * summary.link_contact:.0f} %, with {100 * summary.link_force_share:.0f} % of the normal force; the "
-        f"cube {1e3 * summary.rise:.0f} mm above its start late on; {summary.finger_lifts:.1f} finger lifts\n"
+        f"cube {1e3 * summary.rise:.0f} mm above its start late on, median drift {1e3 * summary.drift:.2f} mm/s; "
+        f"{summary.finger_lifts:.1f} finger lifts\n"
         f"  {verdicts}; reward {sum(summary.reward_terms.values()):.0f}: {terms}"
     )
 
 
-NO_PROPERTY = ("seed", "force_seed")  # where random numbers come from: larger is not more of anything
-SIGNIFICANT = 0.05  # for all constants together: one false name in twenty evaluations
-LEAST = 5  # episodes lost and kept, below which no test can tell
-
-
 @dataclass(frozen=True)
 class LostWhere:
-    """A constant of the world that tells kept objects from lost ones.
+    """A constant of the world that separates kept objects from lost ones.
 
     Attributes:
         constant: its name.
@@ -156,10 +159,8 @@ class LostWhere:
     @property
     def text(self) -> str:
         """In words."""
-        parts = (
-            f"{kept} of {count} at {low:.3g} to {high:.3g}"
-            for kept, count, low, high in zip(self.kept, self.episodes, self.edges[:-1], self.edges[1:], strict=True)
-        )
+        thirds = zip(self.kept, self.episodes, self.edges[:-1], self.edges[1:], strict=True)
+        parts = (f"{kept} of {count} at {low:.3g} to {high:.3g}" for kept, count, low, high in thirds)
         return f"kept by {self.constant}: {', '.join(parts)} (p {self.p_value:.1e})"
 
 
@@ -171,21 +172,18 @@ def drawn(results: Sequence[EpisodeResult]) -> list[str]:
 
 
 def lost_where(results: Sequence[EpisodeResult]) -> list[LostWhere]:
-    """Constants that tell kept objects from lost ones, surest first; none where too few were lost or kept.
+    """Constants that separate kept objects from lost ones, surest first; none where too few were lost or kept.
 
     Source of the test: Mann and Whitney, Annals of Mathematical Statistics 18 (1947).
     """
     kept, names = np.array([result.kept for result in results]), drawn(results)
-    if min(kept.sum(), (~kept).sum()) < LEAST:
-        return []
     found = []
-    for name in names:
+    for name in names if min(kept.sum(), (~kept).sum()) >= LEAST else ():
         values = np.array([float(result.world[name]) for result in results])
         p_value = min(1.0, len(names) * float(mannwhitneyu(values[kept], values[~kept]).pvalue))
         if p_value < SIGNIFICANT:
             thirds = np.array_split(np.argsort(values, kind="stable"), 3)
-            low, lower, upper, high = (float(values[k]) for k in (thirds[0][0], *(t[-1] for t in thirds)))
-            counts = [int(kept[third].sum()) for third in thirds]
-            sizes = [len(third) for third in thirds]
-            found.append(LostWhere(name, p_value, (low, lower, upper, high), tuple(counts), tuple(sizes)))
+            edges = tuple(float(values[k]) for k in (thirds[0][0], *(third[-1] for third in thirds)))
+            counts, sizes = (tuple(int(of(third)) for third in thirds) for of in (lambda t: kept[t].sum(), len))
+            found.append(LostWhere(name, p_value, edges, counts, sizes))
     return sorted(found, key=lambda one: one.p_value)

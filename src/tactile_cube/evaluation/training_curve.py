@@ -103,9 +103,18 @@ def sweep_table(runs: Mapping[str, Mapping[int, Curve]], paper: Mapping[str, str
     head = ["setting", *(["paper, million steps"] if paper else []), "million steps, seed by seed", *MEDIANS]
     lines = [head, ["---"] * len(head)]
     for setting in paper or sorted(runs):
+        begun, medians, steps = list[str](), [""] * len(MEDIANS), list[float]()
         curves = [curve for _, curve in sorted(runs.get(setting, {}).items())]
-        steps = ", ".join(map(_until, curves)) or "not run"
-        lines.append([setting, *([paper[setting]] if paper else []), steps, *_over_seeds(curves)])
+        for curve in curves:
+            row, columns = regrasping_begins(curve), curve.columns
+            steps.append(float("inf") if row is None else columns[STEPS][row] / 1e6)
+            last = f"> {columns[STEPS][-1] / 1e6:.3f} (at {columns[ANGLE][-1]:.1f} rad)"
+            begun.append(last if row is None else f"{steps[-1]:.3f}")
+        if curves:
+            hours = sum(curve.columns[name][-1] for curve in curves for name in COSTS if name in curve.columns)
+            angles = [curve.columns[ANGLE][-1] for curve in curves]
+            medians = [_interval(steps, 3), _interval(angles, 2), f"{hours:.3f}"]
+        lines.append([setting, *([paper[setting]] if paper else []), ", ".join(begun) or "not run", *medians])
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
@@ -125,23 +134,6 @@ def median_interval(values: Sequence[float]) -> tuple[float, float, float]:
     return median(ordered), ordered[first], ordered[n - 1 - first]
 
 
-def _over_seeds(curves: Sequence[Curve]) -> list[str]:
-    if not curves:
-        return [""] * len(MEDIANS)
-    begun = [(curve, regrasping_begins(curve)) for curve in curves]
-    steps = [float("inf") if row is None else curve.columns[STEPS][row] / 1e6 for curve, row in begun]
-    angles = [curve.columns[ANGLE][-1] for curve in curves]
-    hours = sum(curve.columns[name][-1] for curve in curves for name in COSTS if name in curve.columns)
-    return [_interval(steps, 3), _interval(angles, 2), f"{hours:.3f}"]
-
-
 def _interval(values: Sequence[float], digits: int) -> str:
     middle, low, high = (f"{value:.{digits}f}".replace("inf", "never") for value in median_interval(values))
     return f"{middle} ({low} to {high})"
-
-
-def _until(curve: Curve) -> str:
-    row = regrasping_begins(curve)
-    if row is not None:
-        return f"{curve.columns[STEPS][row] / 1e6:.3f}"
-    return f"> {curve.columns[STEPS][-1] / 1e6:.3f} (at {curve.columns[ANGLE][-1]:.1f} rad)"

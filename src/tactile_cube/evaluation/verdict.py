@@ -1,4 +1,4 @@
-"""One word for what an episode was, with the numbers it rests on."""
+"""One row for each episode: a word for what it was, the numbers it rests on, and what is physically wrong with it."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ from dataclasses import asdict, dataclass
 from enum import StrEnum
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from tactile_cube.env.reward import SUPPORTING_TIPS, TOUCH_FORCE
 from tactile_cube.evaluation.episode_record import Array, EpisodeRecord
-from tactile_cube.evaluation.touch import finger_history, support, touching
 
 REGRASP_ANGLE = 2.0
 """Final angle beyond which four fingers that never let go cannot have turned the cube [rad].
@@ -20,13 +21,8 @@ STILL_ANGLE = 0.5
 """Below this final angle the cube counts as held, not turned [rad]."""
 REGRASP_FACE_CHANGES = 2
 """Moves of a finger to another side face that a regrasping episode shows at least."""
-
-LATE_SHARE = 0.4
-"""The last part of an episode, in which a hand that regrasps still turns the cube."""
-LATE_ANGLE = 0.25
-"""Angle that must be gained in this part [rad]; less means that the hand has come to rest."""
-
-
+LATE_SHARE, LATE_ANGLE = 0.4, 0.25
+"""The last part of an episode, and the angle that must be gained in it [rad]: less means that the hand stagnates."""
 SUCCESS_RATE = 15.0 / 40.0
 """An episode succeeds that keeps the object to the end and turns it at least so fast on average [rad/s].
 
@@ -34,6 +30,20 @@ SUCCESS_RATE = 15.0 / 40.0
 """
 SUCCESS = "kept to the end and turned by at least 15 rad in 40 s, in proportion for other lengths"
 """The rule in words."""
+MAX_ANGLE_MISMATCH = 0.3
+"""Largest difference between the reported angle and the integrated rotation about the task's axis [rad]."""
+CONE = 0.06
+"""Share of the angle that may differ besides: the axis of a cube tilted by up to 20 deg goes around a cone as it turns,
+whose solid angle 1 - cos(20 deg) a turn is in the integrated rotation and not in the angle."""
+MAX_FREE_SPIN_SHARE = 0.2
+"""Largest share of the final angle that may be gained while nothing holds the cube."""
+MAX_TILT = 0.8
+"""Largest tilt of the cube's z axis [rad]; the training episode ends there too."""
+MAX_PENETRATION = 0.006
+"""Deepest overlap of a finger and the cube [m]; a firm grasp of 10 N overlaps by less than 1 mm."""
+MAX_STEP_ANGLE = np.pi / 4
+"""Largest turn within one policy step [rad]: beyond it a quarter turn of the symmetric cube could hide."""
+FACES = ("+x", "-x", "+y", "-y", "+z", "-z")
 
 
 class EpisodeVerdict(StrEnum):
@@ -72,6 +82,7 @@ class EpisodeResult:
         faces_visited: different side faces each finger has stood on, ring to thumb.
         max_tilt: largest tilt of the cube [rad].
         rise: mean height of the cube above its start in the last `LATE_SHARE` of the episode [m].
+        drift: mean vertical velocity of the cube, below 0 where it sinks [m/s].
         tip_support: as `link_contact` and `link_force_share`: see `touch.support`.
         reward_terms: sum of each weighed term of the reward.
         exploits: names of physical exploits found; empty when the turning is honest.
@@ -90,6 +101,7 @@ class EpisodeResult:
     faces_visited: tuple[int, ...]
     max_tilt: float
     rise: float
+    drift: float
     tip_support: float
     link_contact: float
     link_force_share: float
@@ -116,22 +128,26 @@ def judge_episode(record: EpisodeRecord, episode: int = 0, seed: int = 0) -> Epi
     """Reduce an episode to its row."""
     histories = [finger_history(record, finger) for finger in range(len(record.fingers))]
     angle = float(record.theta[-1] - record.theta[0])
-    begin = round((1.0 - LATE_SHARE) * record.steps)
-    late = float(record.theta[-1] - record.theta[begin])
+    begin, duration = round((1.0 - LATE_SHARE) * record.steps), float(record.time[-1] - record.time[0])
+    late, height = (
+        float(record.theta[-1] - record.theta[begin]),
+        record.cube_position[:, 2] - record.cube_position[0, 2],
+    )
     changes = tuple(history.face_changes for history in histories)
     return EpisodeResult(
         episode=episode,
         seed=seed,
         final_angle=angle,
         late_angle=late,
-        duration=float(record.time[-1] - record.time[0]),
+        duration=duration,
         ending=record.ending,
         verdict=verdict(angle, late, sum(changes), lost=record.cut_short),
         finger_lifts=tuple(history.lifts for history in histories),
         face_changes=changes,
         faces_visited=tuple(len(set(history.faces)) for history in histories),
         max_tilt=float(np.max(cube_tilt(record))),
-        rise=float(np.mean(record.cube_position[begin:, 2]) - record.cube_position[0, 2]),
+        rise=float(np.mean(height[begin:])),
+        drift=float(height[-1]) / max(duration, 1e-9),
         **support(record),
         reward_terms={name: float(np.sum(term)) for name, term in record.reward_terms.items()},
         exploits=tuple(exploits(record)),
@@ -143,27 +159,82 @@ def verdict(final_angle: float, late_angle: float, face_changes: int, *, lost: b
     """Apply the definitions of `EpisodeVerdict`."""
     regrasped = face_changes >= REGRASP_FACE_CHANGES
     if lost:
-        return (
-            EpisodeVerdict.SPUN_AND_DROPPED if final_angle > STILL_ANGLE and not regrasped else EpisodeVerdict.DROPPED
-        )
+        twisted = final_angle > STILL_ANGLE and not regrasped
+        return EpisodeVerdict.SPUN_AND_DROPPED if twisted else EpisodeVerdict.DROPPED
     if final_angle > REGRASP_ANGLE and late_angle > LATE_ANGLE and regrasped:
         return EpisodeVerdict.REGRASPING
     return EpisodeVerdict.HOLDING if final_angle < STILL_ANGLE else EpisodeVerdict.STUCK_TWISTED
 
 
-MAX_ANGLE_MISMATCH = 0.3
-"""Largest difference between the reported angle and the integrated rotation about the task's axis [rad]."""
-CONE = 0.06
-"""Share of the angle that may differ besides: the axis of a cube tilted by up to 20 deg goes around a cone as it turns,
-whose solid angle 1 - cos(20 deg) a turn is in the integrated rotation and not in the angle."""
-MAX_FREE_SPIN_SHARE = 0.2
-"""Largest share of the final angle that may be gained while nothing holds the cube."""
-MAX_TILT = 0.8
-"""Largest tilt of the cube's z axis [rad]; the training episode ends there too."""
-MAX_PENETRATION = 0.006
-"""Deepest overlap of a finger and the cube [m]; a firm grasp of 10 N overlaps by less than 1 mm."""
-MAX_STEP_ANGLE = np.pi / 4
-"""Largest turn within one policy step [rad]: beyond it a quarter turn of the symmetric cube could hide."""
+@dataclass(frozen=True)
+class FingerHistory:
+    """How often a finger let go and touched again later, and the side faces it landed on, in their order."""
+
+    lifts: int
+    faces: tuple[str, ...]
+
+    @property
+    def face_changes(self) -> int:
+        """How often it moved to another side face: what a regrasp is."""
+        return max(len(self.faces) - 1, 0)
+
+
+def touching(record: EpisodeRecord) -> NDArray[np.bool_]:
+    """Return which finger touches the cube at each sample `(n + 1, fingers)`."""
+    table = record.contacts
+    result = np.zeros((record.steps + 1, len(record.fingers)), dtype=bool)
+    firm = table.normal_force > TOUCH_FORCE
+    result[table.step[firm], table.finger[firm]] = True
+    return result
+
+
+def support(record: EpisodeRecord) -> dict[str, float]:
+    """What bears the cube at the ends of the policy steps; a touch is more than `TOUCH_FORCE` of a tip, or of links.
+
+    Returns:
+        tip_support: share of the time in which `SUPPORTING_TIPS` fingertips or more touch it. link_contact: share of
+        the time in which a link touches it that is no fingertip. link_force_share: these links' share of all normal
+        force of the fingers; 0 without any force.
+    """
+    table = record.contacts
+    force = np.zeros((2, record.steps + 1, len(record.fingers)))
+    np.add.at(force, (table.tip.astype(np.int64), table.step, table.finger), table.normal_force)
+    links, tips = force[:, 1:]  # without the start, where no force has acted yet
+    total = float(links.sum() + tips.sum())
+    return {
+        "tip_support": float(((tips > TOUCH_FORCE).sum(axis=1) >= SUPPORTING_TIPS).mean()),
+        "link_contact": float((links > TOUCH_FORCE).any(axis=1).mean()),
+        "link_force_share": float(links.sum()) / total if total > 0.0 else 0.0,
+    }
+
+
+def touched_faces(record: EpisodeRecord) -> NDArray[np.int64]:
+    """Return the face of each contact row `(k,)`: an index into `FACES`, in the cube's own frame."""
+    table = record.contacts
+    if not len(table.step):
+        return np.zeros(0, dtype=np.int64)
+    orientation = Rotation.from_quat(record.cube_quaternion[table.step])
+    scaled = orientation.inv().apply(table.position - record.cube_position[table.step]) / (record.cube_size / 2)
+    axis = np.argmax(np.abs(scaled), axis=1)
+    return np.asarray(2 * axis + (scaled[np.arange(len(axis)), axis] < 0), dtype=np.int64)
+
+
+def finger_history(record: EpisodeRecord, finger: int) -> FingerHistory:
+    """Follow one finger through the episode; an edge touches two faces, so a face must hold for two samples."""
+    contact, table = touching(record)[:, finger], record.contacts
+    landed = np.flatnonzero(contact[1:] & ~contact[:-1]) + 1
+    mine = (table.finger == finger) & (table.normal_force > TOUCH_FORCE)
+    touched: dict[int, set[int]] = {}
+    for step, face in zip(table.step[mine].tolist(), touched_faces(record)[mine].tolist(), strict=True):
+        if face < 4:
+            touched.setdefault(step, set()).add(face)
+    sequence: list[int] = []
+    for step in sorted(touched):
+        settled = touched[step] & touched.get(step + 1, set())
+        if len(settled) == 1 and settled != {*sequence[-1:]}:
+            sequence.extend(settled)
+    lifts = sum(bool(contact[:sample].any()) for sample in landed)
+    return FingerHistory(lifts, tuple(FACES[face] for face in sequence))
 
 
 def cube_tilt(record: EpisodeRecord) -> Array:
@@ -175,7 +246,7 @@ def cube_tilt(record: EpisodeRecord) -> Array:
 def integrated_rotation(record: EpisodeRecord) -> Array:
     """Return the turn about the task's axis from increments of the quaternion `(n + 1,)` [rad].
 
-    It knows nothing of Euler angles or of how the environment unwraps theta: an independent second opinion.
+    It does not depend on Euler angles or on how the environment unwraps theta.
     """
     orientation = Rotation.from_quat(record.cube_quaternion)
     increments = (orientation[1:] * orientation[:-1].inv()).as_rotvec() @ np.array(record.axis)
@@ -187,25 +258,19 @@ def free_spin(record: EpisodeRecord) -> float:
 
     In the air it takes two fingers to hold it; on a table one is enough to push it around.
     """
-    needed = 1 if "table_height" in record.constants else 2
-    loose = touching(record).sum(axis=1) < needed
-    gained = np.diff(record.theta)
-    return float(np.sum(np.maximum(gained[loose[1:] & loose[:-1]], 0.0)))
+    loose = touching(record).sum(axis=1) < (1 if "table_height" in record.constants else 2)
+    return float(np.sum(np.maximum(np.diff(record.theta)[loose[1:] & loose[:-1]], 0.0)))
 
 
 def exploits(record: EpisodeRecord) -> list[str]:
     """Name what is physically wrong with an episode; an empty list when nothing is."""
-    found = []
     gained = float(record.theta[-1] - record.theta[0])
-    if abs(gained - integrated_rotation(record)[-1]) > MAX_ANGLE_MISMATCH + CONE * abs(gained):
-        found.append("angle_mismatch")
-    if record.steps and np.max(np.abs(np.diff(record.theta))) > MAX_STEP_ANGLE:
-        found.append("angle_jump")
-    if gained > 0.5 and free_spin(record) > MAX_FREE_SPIN_SHARE * gained:
-        found.append("flung")
-    # A cube that falls may tumble as it goes: the tilt counts only while it is held.
-    if not record.cut_short and np.max(cube_tilt(record)) > MAX_TILT:
-        found.append("tumbled")
-    if np.min(record.contacts.distance, initial=0.0) < -MAX_PENETRATION:
-        found.append("penetration")
-    return found
+    found = {
+        "angle_mismatch": abs(gained - integrated_rotation(record)[-1]) > MAX_ANGLE_MISMATCH + CONE * abs(gained),
+        "angle_jump": np.max(np.abs(np.diff(record.theta)), initial=0.0) > MAX_STEP_ANGLE,
+        "flung": gained > 0.5 and free_spin(record) > MAX_FREE_SPIN_SHARE * gained,
+        # A cube that falls may tumble as it goes: the tilt counts only while it is held.
+        "tumbled": not record.cut_short and np.max(cube_tilt(record)) > MAX_TILT,
+        "penetration": np.min(record.contacts.distance, initial=0.0) < -MAX_PENETRATION,
+    }
+    return [name for name, wrong in found.items() if wrong]

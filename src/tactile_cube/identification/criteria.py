@@ -21,6 +21,7 @@ class Criteria:
         significant: probability that a named set is chance, all that was looked at counted.
         most: share of the excess error from which on an explanation is a part of the truth.
         nearly_whole: share from which on it is the whole but for a detail.
+        most_simulated: trial time that a search may simulate [s]; then it says what it has.
         margin: part of a joint's limits (half its range, its speed, its torque) that a proposed command keeps free.
     """
 
@@ -33,6 +34,7 @@ class Criteria:
     significant: float = 0.01
     most: float = 0.9
     nearly_whole: float = 0.98
+    most_simulated: float = 3e5
     margin: float = 0.1
 
     def __post_init__(self) -> None:

@@ -14,17 +14,15 @@ from tactile_cube.errors import InputError
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.disturbances import Disturbance, in_time
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit
-from tactile_cube.identification.fitting.held_out import HeldOut
 from tactile_cube.identification.fitting.intervals import Fitted
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.resolution import resolved
 from tactile_cube.identification.inquiry import NOT_ALL, Inquiry, beside_disturbances
 from tactile_cube.identification.next_experiment import Experiment, next_experiment
-from tactile_cube.identification.search.evidence import gain, judge
+from tactile_cube.identification.search.evidence import HeldOut, gain, judge
 from tactile_cube.identification.search.explanation import Explanation
-from tactile_cube.identification.search.findings import Findings
-from tactile_cube.identification.search.search import Search
-from tactile_cube.identification.search.shared_offset import CommonOffset, common_offsets
+from tactile_cube.identification.search.findings import CommonOffset, Findings, common_offsets
+from tactile_cube.identification.search.search import BestSoFar, Search
 from tactile_cube.identification.standard_model import StandardModel, fit_standard_model
 from tactile_cube.identification.verdict import Simulations, Unexplained, Verdict
 from tactile_cube.measurement.comparing.error import ErrorSummary, free_run_error
@@ -64,6 +62,7 @@ class Diagnosis:
         left_out: stretches that follow no model, and that count in nothing above.
         suspected: stretches that may be such ones, and count.
         unseen: effects that no trial could show.
+        criteria: what decided.
     """
 
     verdict: Verdict
@@ -83,11 +82,12 @@ class Diagnosis:
     left_out: tuple[Disturbance, ...] = ()
     suspected: tuple[Disturbance, ...] = ()
     unseen: tuple[Unseen, ...] = ()
+    criteria: Criteria = STANDARD
 
     @property
     def unproven(self) -> tuple[Explanation, ...]:
         """What would explain much beside the chosen effects, were the held-out segments enough to show it."""
-        return self.findings.unproven[:UNPROVEN] if self.verdict.kind in NOT_ALL else ()
+        return tuple(self.findings.unproven(self.criteria)[:UNPROVEN]) if self.verdict.kind in NOT_ALL else ()
 
     def errors(self) -> ModelErrors:
         """The error of each stage as the model file and diagnosis.json state it [rad]."""
@@ -117,13 +117,17 @@ def diagnose_recording(
         known: the model to begin with, whose effects are no news; None: what the recording's owner states.
         criteria: what decides.
     """
+    say = BestSoFar(say)
     recording = in_time(recording, effects, say, known)
     recording = in_steps(recording, effects, known, say)
     whole = Inquiry(recording, effects, seed, say, known, criteria)
     standard = fit_standard_model(*whole.parts[:2], noise_with_links(recording), known, effects)
-    say(standard.sentence(common_unit(recording.units.values())))
+    say.answer, say.following = standard.sentence(common_unit(recording.units.values())), "its constants alone"
+    say(say.answer)
     inquiry, left_out, suspected = beside_disturbances(whole)
     search, findings, simulations, verdict = inquiry.answer
+    if findings.stopped:
+        say(f"stopped early, after {search.shooting.simulated:.0f} s of simulated trials; next: {findings.stopped}")
     _, held_out, tested = inquiry.parts
     test = held_out if tested is None else tested
     untouched = HeldOut(search.shooting, test, search.noise, nominal_model(test, known).offsets)
@@ -159,6 +163,7 @@ def diagnose_recording(
         left_out=left_out,
         suspected=suspected,
         unseen=unseen(effects, search.shooting.sizes, [term.label for term in fitted.model.terms]),
+        criteria=criteria,
     )
     fits = open_fits(diagnosis)
     if len(fits) == 1:
@@ -195,17 +200,14 @@ def in_steps(recording: Recording, effects: Sequence[type[Effect]], known: Model
         InputError: gains and inertias call for more steps than any search can make.
     """
     fine = resolved(recording, effects, say, known)
-    if _steps(fine) > MOST_STEPS:
+    steps = steps_per_row(fine, joint_scales(fine)[0].time)
+    if steps > MOST_STEPS:
         raise InputError(
-            f"{recording.rig.path}: gains and inertias call for {_steps(fine)} steps of simulation a row, at most "
+            f"{recording.rig.path}: gains and inertias call for {steps} steps of simulation a row, at most "
             f"{MOST_STEPS} are made; check kp, kd, nominal.reflected_inertia and the inertias of the URDF"
         )
-    say(f"{_steps(fine)} steps of simulation a sample")
+    say(f"{steps} steps of simulation a sample")
     return fine
-
-
-def _steps(recording: Recording) -> int:
-    return steps_per_row(recording, joint_scales(recording)[0].time)
 
 
 def open_fits(diagnosis: Diagnosis) -> dict[str, Fit]:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
+from tactile_cube.identification.criteria import Criteria
 from tactile_cube.identification.diagnosis import Diagnosis
 from tactile_cube.identification.fitting.intervals import Fitted, bounds
 from tactile_cube.identification.model_files import effect_estimate
@@ -31,10 +32,11 @@ def as_json(diagnosis: Diagnosis, seconds: float) -> dict[str, Any]:
         "effects": effects if verdict.kind not in ("adequate", "unknown_effect") else [],
         "sets": [names_of(one) for one, _ in explanations] if diagnosis.rivals else [],
         "unexplained_joints": unexplained_joints(verdict.chosen, tuple(joints)),
-        "ranking": ranking(diagnosis.findings),
+        "ranking": ranking(diagnosis.findings, diagnosis.criteria),
         "error": {key: errors[key] for key in ("nominal", "refitted", "with_effects", "noise_floor")},
         "error_joints": errors["joints"],
         "noise_floor_source": diagnosis.floor.source,
+        "drift": [asdict(one) for one in diagnosis.floor.drift],
         "standard_model": {
             "otherwise": list(diagnosis.standard.otherwise),
             "error": diagnosis.standard.error,
@@ -63,6 +65,7 @@ def as_json(diagnosis: Diagnosis, seconds: float) -> dict[str, Any]:
         "inseparable": [list(pair) for pair in experiment.inseparable] if experiment else [],
         "held_out": diagnosis.held_out,
         "tested": diagnosis.tested,
+        "stopped_early": diagnosis.findings.stopped,
         "seconds": round(seconds, 2),
     }
 
@@ -91,10 +94,10 @@ def safety_as_json(experiment: Experiment) -> dict[str, Any]:
     }
 
 
-def ranking(findings: Findings) -> list[dict[str, Any]]:
+def ranking(findings: Findings, criteria: Criteria) -> list[dict[str, Any]]:
     """What was judged: refitted explanations with held-out errors, then laws of the first look."""
     rows: dict[str, dict[str, Any]] = {}
-    for one in (*(e for level in findings.levels for e in level), *findings.surpassed):
+    for one in findings.proven(criteria):
         numbers = {"gain": round(one.gain, 5), "p_value": one.p_value}
         name = " & ".join(names_of(one))
         rows.setdefault(name, {"effects": name, "held_out_error_over_noise": round(one.error, 4)} | numbers)

@@ -13,13 +13,12 @@ from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.criteria import STANDARD
 from tactile_cube.identification.fitting.problem import Problem
-from tactile_cube.identification.fitting.shooting import Shooting
-from tactile_cube.identification.search.division import Division
 from tactile_cube.identification.search.evidence import judge, segment_errors
 from tactile_cube.identification.search.explanation import Proposal
 from tactile_cube.identification.search.proposals import look
 from tactile_cube.identification.search.search import Search
-from tactile_cube.measurement.comparing.noise_floor import noise_with_links, repeats_of
+from tactile_cube.measurement.comparing.noise_floor import noise_with_links
+from tactile_cube.measurement.comparing.repeats import repeats_of
 from tactile_cube.measurement.recordings.description import MOST_LATE
 from tactile_cube.measurement.recordings.reading import DESCRIPTION
 from tactile_cube.measurement.recordings.recording import Recording
@@ -56,16 +55,16 @@ class Disturbance:
     repeats: int
 
 
-def disturbances(division: Division, recording: Recording, model: Model) -> list[Disturbance]:
+def disturbances(search: Search, recording: Recording, model: Model) -> list[Disturbance]:
     """Stretches of all trials in which the model fails although it holds elsewhere, and where its command is repeated.
 
     Args:
-        division: cuts trials into segments and simulates them.
+        search: cuts trials into segments and simulates them.
         recording: every trial, of both parts and those that test.
         model: fitted; joint offsets that it lacks are fitted here.
     """
-    problem = Problem(division.shooting, division.windows(recording))
-    found = model.with_offsets(nominal_model(recording, division.known).offsets)
+    problem = Problem(search.shooting, search.windows(recording))
+    found = model.with_offsets(nominal_model(recording, search.known).offsets)
     problem.linearise_starts(found)
     errors = segment_errors(problem, judge(problem, recording, found).residual)
     usual = np.maximum(np.nanquantile(errors, USUAL, axis=0), 1.0)
@@ -173,8 +172,8 @@ def in_time(
 
 def _fitted(recording: Recording, effects: Sequence[type[Effect]], known: ModelFile | None) -> tuple[float, float]:
     """Error of the base model [sensor noise], and when the joint that is read last is read [rows after its stamp]."""
-    shooting, noise = Shooting(recording, effects), noise_with_links(recording)
-    base = Division(shooting, recording, recording, noise, known=known, segments=SEGMENTS).fit_base()
+    noise = noise_with_links(recording)
+    base = Search(recording, recording, noise, effects, lambda line: None, known, segments=SEGMENTS).base
     return base.error, float(base.fit.model.constants["reading_delay"].max() / recording.step)
 
 

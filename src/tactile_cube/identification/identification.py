@@ -84,7 +84,7 @@ def identify_effects(
     wanted = [one for text in effects for one in _wanted(text, recording.joints)]
     classes = tuple(dict.fromkeys(effect for effect, *_ in wanted))
     search, floor = divided(recording, classes, seed, say)
-    held_out, base = search.held_out, search.fit_base()
+    held_out, base = search.held_out, search.base
     stages = {"nominal": search.start_held_out, "refitted": base.judgement.model}
     current, judgement = base.fit, base.judgement
     for effect, joint, parameters in wanted:

@@ -8,6 +8,7 @@ from typing import Any
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.next_experiment import FILE, Experiment
 from tactile_cube.identification.safe_commands import QUANTITIES, SCALES, TRIALS
+from tactile_cube.measurement.comparing.repeats import Drift
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.units import TURNS, common_unit, milli, of_joint, short
 
@@ -48,6 +49,9 @@ def answer(result: dict[str, Any], experiment: Experiment | None, constants: Seq
     lines += [_unexplained(entry) for entry in result["unexplained"]]
     lines += [f"  {common_offset(entry, units)}" for entry in result.get("common_offsets", [])]
     lines += [f"  {line}" for line in (*disturbed(result), *unseen_effects(result))]
+    lines += [f"  {Drift(**one).sentence(units.get(one['joint'], TURNS))}." for one in result.get("drift", [])]
+    if left := result.get("stopped_early"):
+        lines.append(f"The search stopped early (criteria.most_simulated); next: {left}.")
     lines += [f"Constants found otherwise than stated: {', '.join(constants)}."] if constants else []
     error, unit = result["error"], common_unit(units.values())
     refitted = f"{milli(error['refitted'], unit)} with constants refitted, " if not grasps else ""

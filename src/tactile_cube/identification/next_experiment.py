@@ -17,12 +17,11 @@ from scipy.linalg import block_diag
 
 from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.identification.criteria import STANDARD, Criteria
-from tactile_cube.identification.fitting.base import offset_unknowns
 from tactile_cube.identification.fitting.gauss_newton import Fit, precision
 from tactile_cube.identification.fitting.problem import Problem
+from tactile_cube.identification.fitting.resolution import FINER, finer
 from tactile_cube.identification.fitting.shooting import Shooting
-from tactile_cube.identification.fitting.time_step import FINER, finer
-from tactile_cube.identification.fitting.unknowns import Unknown
+from tactile_cube.identification.fitting.unknowns import Unknown, offset_unknowns
 from tactile_cube.identification.safe_commands import PossibleMotions, Safety, covariance_of_numbers
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
@@ -99,7 +98,8 @@ def next_experiment(
     proposed = motions.safe_trials(seed)
     safe = [(trial, safety) for trial, safety in proposed if safety.safe]
     if not safe:
-        return _unsafe(recording, *proposed[0])
+        (one, unsafe), joints = proposed[0], recording.joints
+        return Experiment(one.kind, joints, one.time, one.command, 0.0, joints[0], {}, unsafe)
     trials = [trial for trial, _ in safe]
     whole = finer(shooting.cut(recording, noise, trials, segment=len(trials[0].time)), FINER)
     names, fits = list(rivals), list(rivals.values())
@@ -170,11 +170,6 @@ def _told(
         left = float(np.sum(residual * one) - pull @ np.linalg.pinv(gram + known) @ pull)
         times.append(left / (criteria.band**2 + criteria.detail * float(blurred[rows].sum())))
     return np.array(times)
-
-
-def _unsafe(recording: Recording, trial: Trial, safety: Safety) -> Experiment:
-    """A command that is not to be played, as an example."""
-    return Experiment(trial.kind, recording.joints, trial.time, trial.command, 0.0, recording.joints[0], {}, safety)
 
 
 def _known(trials: Recording, fitted: Fit, sizes: Mapping[str, Scales]) -> tuple[tuple[Unknown, ...], Array]:

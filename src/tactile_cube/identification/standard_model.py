@@ -21,14 +21,14 @@ from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.criteria import STANDARD
-from tactile_cube.identification.fitting.base import base_unknowns, every_effect
-from tactile_cube.identification.fitting.gauss_newton import Fit, fit
-from tactile_cube.identification.fitting.held_out import HeldOut
+from tactile_cube.identification.fitting.gauss_newton import Fit, fit, precision
 from tactile_cube.identification.fitting.intervals import NORMAL_95, standard_errors
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.shooting import Shooting
+from tactile_cube.identification.fitting.unknowns import base_unknowns, every_effect
 from tactile_cube.identification.search.candidates import Candidate, model_unknowns
-from tactile_cube.identification.search.division import some
+from tactile_cube.identification.search.evidence import HeldOut
+from tactile_cube.identification.search.search import some
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model, Term
 from tactile_cube.measurement.replay.nominal import nominal_model
@@ -132,24 +132,21 @@ def fit_standard_model(
         known: the model to begin with; None: what the recording's owner states.
         effects: classes to compile in; their kernel is used again by a search for them.
     """
-    return _Fitting(fitted, held_out, noise, known, effects).run()
+    start = nominal_model(fitted, known)
+    shooting = Shooting(fitted, every_effect(effects, start))
+    judge = HeldOut(shooting, held_out, noise, nominal_model(held_out, known).offsets)
+    return _Fitting(fitted, noise, start, shooting, judge).run()
 
 
+@dataclass(frozen=True)
 class _Fitting:
-    """The trials, and the models that are tried one after another."""
+    """The trials to fit and those to judge by, and the models that are tried one after another."""
 
-    def __init__(
-        self,
-        fitted: Recording,
-        held_out: Recording,
-        noise: Array,
-        known: ModelFile | None,
-        effects: Sequence[type[Effect]],
-    ) -> None:
-        self.recording, self.noise = fitted, noise
-        self.start = nominal_model(fitted, known)
-        self.shooting = Shooting(fitted, every_effect(effects, self.start))
-        self.judge = HeldOut(self.shooting, held_out, noise, nominal_model(held_out, known).offsets)
+    recording: Recording
+    noise: Array
+    start: Model
+    shooting: Shooting
+    judge: HeldOut
 
     def run(self) -> StandardModel:
         """The plain model in growing windows, by direction too where that is better, then what of it is needed."""
@@ -179,7 +176,7 @@ class _Fitting:
         """How many rows a window of so long has, of a finger or of what is as slow in proportion."""
         return round(seconds * self.shooting.time / self.recording.step)
 
-    def robust(self, model: Model, rows: int) -> _Tried:
+    def robust(self, model: Model, rows: int, rounds: int = ROUNDS) -> _Tried:
         """A fit in windows of so many rows with a soft-L1 loss, by weights that are taken anew."""
         segments = max(
             1, round(LONGEST_FITTED * self.shooting.time / (len(self.recording.joints) * rows * self.recording.step))
@@ -187,7 +184,7 @@ class _Fitting:
         windows = some(self.shooting.cut(self.recording, self.noise, segment=rows), segments)
         sizes = self.shooting.sizes
         unknowns = (*base_unknowns(self.recording, self.start.constants, sizes), *model_unknowns(model, sizes))
-        for _ in range(ROUNDS):
+        for _ in range(rounds):
             problem = self.weighted(windows, model)
             found = fit(problem, model, unknowns, ITERATIONS)
             model = found.model
@@ -204,22 +201,22 @@ class _Fitting:
         return problem
 
     def needed(self, best: _Tried) -> _Tried:
-        """Without the effects that are as stated, the least certain one of each joint first."""
+        """Without the effects that are as stated, then without those in proportion with a torque constant."""
         assert best.fit is not None, "what is stated has nothing to take out"
-        new, first = best.model.terms[len(self.start.terms) :], len(self.start.terms)
-        sure = certainties(best.model, best.fit, best.half_width)
-        doubt = {term.label: sure[first + k] for k, term in enumerate(new)}
-        by_joint = {joint: [t.label for t in new if t.joint == joint] for joint in self.recording.joints}
-        least = {min(labels, key=doubt.__getitem__) for labels in by_joint.values() if labels}
-        needless = {label for label in least if doubt[label] < 1.0}
-        if not needless:
-            needless = {t.label for t in new if t.effect.name in IN_PROPORTION}
-        if not needless:
+        best = self.without(best, needless(best, len(self.start.terms)))
+        plain = {t.label for t in best.model.terms[len(self.start.terms) :] if t.effect.name in IN_PROPORTION}
+        fewer = self.without(best, plain)
+        return self.without(fewer, needless(fewer, len(self.start.terms))) if fewer is not best else best
+
+    def without(self, best: _Tried, labels: set[str]) -> _Tried:
+        """The model refitted without some effects; as it was where that is worse."""
+        if not labels:
             return best
-        terms = tuple(t for t in best.model.terms if t not in new or t.label not in needless)
+        first = len(self.start.terms)
+        terms = tuple(t for k, t in enumerate(best.model.terms) if k < first or t.label not in labels)
         near = self.robust(replace(best.model, terms=terms), min(self.rows_of(WINDOWS[1]), best.rows))
-        fewer = min(near, self.robust(near.model, best.rows), key=lambda one: one.error)
-        return self.needed(fewer) if fewer.error**2 <= (1.0 + STANDARD.detail) * best.error**2 else best
+        fewer = min(near, self.robust(near.model, best.rows, 1), key=lambda one: one.error)
+        return fewer if fewer.error**2 <= (1.0 + STANDARD.detail) * best.error**2 else best
 
     def added(self, model: Model) -> tuple[Candidate, ...]:
         """The effects of a model beyond what is known."""
@@ -245,6 +242,32 @@ class _Tried:
     rows: int = 0
     fit: Fit | None = None
     half_width: Array = field(default_factory=lambda: np.zeros(0))
+
+
+def needless(tried: _Tried, first: int) -> set[str]:
+    """Effects from the term `first` on that are as stated, the least certain one of a joint taken out after another.
+
+    What the others become without it follows from the fit's covariance, as large as its intervals say (Wald's test).
+    """
+    assert tried.fit is not None, "what is stated has no covariance"
+    places = np.array([u.place if u.kind == "effect" else -1 for u in tried.fit.unknowns])
+    width = np.maximum(tried.half_width, np.finfo(float).tiny)
+    away = np.array([u.of(tried.model) - u.neutral for u in tried.fit.unknowns]) / width
+    inverse = np.linalg.pinv(tried.fit.information + np.diag(precision(tried.fit.unknowns)), hermitian=True)
+    spread = np.sqrt(np.maximum(np.diag(inverse), np.finfo(float).tiny))
+    covariance = inverse / np.outer(spread, spread)
+    left, out = set(range(first, len(tried.model.terms))), set[str]()
+    while left:
+        sure = np.abs(away) / np.sqrt(np.maximum(np.diag(covariance), np.finfo(float).eps))
+        doubt = {place: float(sure[places == place].max()) for place in left}
+        least = min(doubt, key=doubt.__getitem__)
+        if doubt[least] >= 1.0:
+            return out
+        own = places == least
+        gain = covariance[:, own] @ np.linalg.pinv(covariance[np.ix_(own, own)], hermitian=True)
+        away, covariance = away - gain @ away[own], covariance - gain @ covariance[own]
+        left, out = left - {least}, out | {tried.model.terms[least].label}
+    return out
 
 
 def certainties(model: Model, found: Fit, half_width: Array) -> dict[int, float]:

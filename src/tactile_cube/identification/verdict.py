@@ -11,7 +11,7 @@ from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.intervals import Fitted, final_fit
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.search.evidence import worse
-from tactile_cube.identification.search.explanation import Explanation, contains, named, simplest
+from tactile_cube.identification.search.explanation import Explanation, contains, named, proven, simplest
 from tactile_cube.identification.search.findings import Findings
 from tactile_cube.identification.search.residual_shape import Shape, black_box, missing_torques, shapes
 from tactile_cube.identification.search.search import Search
@@ -39,28 +39,29 @@ class Verdict:
 def decide(findings: Findings, criteria: Criteria = STANDARD) -> Verdict:
     """The answer to what a search has found."""
     base = findings.base
-    found = [one for level in findings.levels for one in level]
+    found = findings.kept(criteria)
     plausible = [one for one in found if not at_bound(one)]
     if not found:
         small = base.largest_error <= criteria.adequate
-        return Verdict("adequate", base) if small else Verdict("unknown_effect", closest((), findings))
+        return Verdict("adequate", base) if small else Verdict("unknown_effect", closest((), findings, criteria))
     if not plausible:
-        return Verdict("unknown_effect", closest(found, findings))
+        return Verdict("unknown_effect", closest(found, findings, criteria))
     chosen = simplest(plausible, criteria)
     share = chosen.explained(base)
     whole = chosen.largest_error <= criteria.tolerated or share > criteria.nearly_whole
     whole &= chosen.error <= criteria.adequate or share >= criteria.most
     if not whole and share < criteria.most:
-        return Verdict("unknown_effect", closest(plausible, findings))
+        return Verdict("unknown_effect", closest(plausible, findings, criteria))
     rivals = find_rivals(chosen, plausible, criteria)
     if not whole:
         return Verdict("partly_explained", chosen, rivals)
     return Verdict("ambiguous" if rivals else "missing_effect", chosen, rivals)
 
 
-def closest(found: Sequence[Explanation], findings: Findings) -> Explanation:
+def closest(found: Sequence[Explanation], findings: Findings, criteria: Criteria) -> Explanation:
     """The explanation that follows the held-out trials best: where none is claimed, a model is there to predict."""
-    possible = [findings.base, *found, *(one for one in findings.unclear if not at_bound(one))]
+    unclear = [one for one in findings.judged if not proven(one, criteria) and not at_bound(one)]
+    possible = [findings.base, *found, *unclear]
     return min(possible, key=lambda one: one.judgement.costs.sum())
 
 

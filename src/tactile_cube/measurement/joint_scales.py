@@ -50,6 +50,7 @@ def joint_scales(recording: Recording) -> tuple[Scales, ...]:
             neighbours=len(spans) - 1,
             leads=joint in leaders,
             first=j == 0,
+            lasts=max(trial.begun + trial.duration for trial in recording.trials),
         )
         for j, joint in enumerate(recording.joints)
     )

@@ -1,4 +1,4 @@
-"""Put a run together: fresh, or where it was."""
+"""Build a training run, or restore it from its checkpoint."""
 
 import contextlib
 import ctypes
@@ -23,17 +23,23 @@ from tactile_cube.env.rotation import OBJECT
 from tactile_cube.errors import InputError
 from tactile_cube.randomization import Learnability
 from tactile_cube.training.checkpoint import FILE, Checkpoints, load_checkpoint, require_same_settings
-from tactile_cube.training.collection import Collection, MakeEnv, MultiSyncCollection, SingleCollection
+from tactile_cube.training.collection import MakeEnv, MultiSyncCollection, SingleCollection
 from tactile_cube.training.ledger import LEDGER, Ledger
-from tactile_cube.training.loggers import MetricLogger
+from tactile_cube.training.loggers import MetricsTable, open_logger
 from tactile_cube.training.loop import Learner
 from tactile_cube.training.replay import Replay
-from tactile_cube.training.run import BEST_POLICY, POLICY, Run
+from tactile_cube.training.run import BEST_POLICY, FILM, POLICY, Run
 from tactile_cube.training.run import FILE as FINISHED
 from tactile_cube.training.settings import CollectorSettings, TrainingSettings
 from tactile_cube.training.transitions import EpisodeStatistics
 from tactile_cube.training.trial import Trial
 from tactile_cube.transforms import EnvConfig, make_env
+
+POLICY_SUFFIX = ".safetensors"
+FROZEN = 3000
+"""Updates that leave the actor of a policy file as it is, unless training.actor_frozen says otherwise."""
+TRIM_THRESHOLD, TOP_PAD, MMAP_THRESHOLD = -1, -2, -3
+"""Numbers of glibc's mallopt."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +53,7 @@ class Environment:
         reward_weights: weights of the terms (terms,) under the conditions in force.
         outcomes: names of the codes in the key "outcome".
         learnability: makes what keeps account of the worlds; None: nothing does.
-        trial: tries an actor in so many episodes an engine, see `Trial`; None: nothing does.
+        trial: tries an actor in so many episodes an engine and films one, see `Trial`; None: nothing does.
         approximations: what its worlds compute less well than they could, in words.
     """
 
@@ -57,7 +63,7 @@ class Environment:
     reward_weights: Callable[[Conditions], Tensor]
     outcomes: tuple[str, ...] = ()
     learnability: Callable[[], Learnability] | None = None
-    trial: Callable[[Actor, int], dict[str, float]] | None = None
+    trial: Callable[[Actor, int, Path], dict[str, float]] | None = None
     approximations: tuple[str, ...] = ()
 
 
@@ -68,7 +74,7 @@ def rotation_environment(config: EnvConfig) -> Environment:
         make=partial(make_env, config),
         sizes=Sizes(2 * joints * config.stack, OBJECT + joints, joints),
         terms=config.reward.terms,
-        reward_weights=partial(_weights, config),
+        reward_weights=lambda conditions: torch.from_numpy(config.reward.weights(conditions.penalty_scale)),
         outcomes=OUTCOMES,
         learnability=partial(config.randomization.learnability, config.constants),
         trial=Trial(config),
@@ -76,20 +82,9 @@ def rotation_environment(config: EnvConfig) -> Environment:
     )
 
 
-def _weights(config: EnvConfig, conditions: Conditions) -> Tensor:
-    return torch.from_numpy(config.reward.weights(conditions.penalty_scale))
-
-
 def as_environment(made: Any) -> Environment:
     """What `env` in the configuration stands for: an environment, or the rotation task's configuration."""
     return made if isinstance(made, Environment) else rotation_environment(made)
-
-
-POLICY_SUFFIX = ".safetensors"
-FROZEN = 3000
-"""Updates that leave the actor of a policy file as it is, unless training.actor_frozen says otherwise."""
-TRIM_THRESHOLD, TOP_PAD, MMAP_THRESHOLD = -1, -2, -3
-"""Numbers of glibc's mallopt."""
 
 
 def build_run(
@@ -99,8 +94,8 @@ def build_run(
     make_agent: Callable[[Sizes], Agent],
     collector: CollectorSettings,
     training: TrainingSettings,
-    loggers: Mapping[str, Callable[..., MetricLogger]],
     config: dict[str, Any],
+    logger: Mapping[str, Any] | None = None,
     make_replay: Callable[..., ReplayBuffer] = TensorDictReplayBuffer,
 ) -> Run:
     """A run in `folder`: gone on with where its checkpoint says, or new.
@@ -112,8 +107,8 @@ def build_run(
         make_agent: builds the agent for the environment's sizes.
         collector: how worlds are spread over processes.
         training: schedule.
-        loggers: makers of loggers by name, called with `folder`, `resumed_at` and `config`.
         config: the resolved configuration, as plain data.
+        logger: settings of `open_logger`.
         make_replay: makes the buffer of transitions, see `Replay`.
 
     Raises:
@@ -131,29 +126,44 @@ def build_run(
         saved = None if training.resume == "never" else checkpoints.load()
         if saved is not None:
             require_same_settings(folder / FILE, saved["config"], config)
-        learner = _build_learner(seed, environment, make_agent, collector, _protected(training), saved, make_replay)
-        held.callback(learner.collection.close)  # worker processes would keep the program from ending
+        agent = make_agent(environment.sizes)
+        if saved is None and training.init_from:
+            training = _warm_start(agent, Path(training.init_from), training)
+        kind = SingleCollection if collector.kind == "single" else MultiSyncCollection
+        collection = kind(environment.make, agent.policy(), collector, training.steps_per_iteration)
+        held.callback(collection.close)  # worker processes would keep the program from ending
+        learner = Learner(
+            agent=agent,
+            replay=Replay(training.replay_size, environment.sizes, len(environment.terms), seed, make_replay),
+            collection=collection,
+            episodes=EpisodeStatistics(
+                environment.outcomes, environment.terms, environment.learnability and environment.learnability()
+            ),
+            settings=training,
+            reward_weights=environment.reward_weights,
+            seed=seed,
+        )
+        if saved is not None:
+            _fit("the run's checkpoint", lambda: learner.load_state_dict(saved["learner"]))
+        elif training.init_replay:
+            learner.replay.load_state_dict(_replay_of(training.init_from))
         if training.resume == "never":  # nothing refuses any more
             _clear(folder, checkpoints)
+        ledger = Ledger(folder / LEDGER, collection.cpu_seconds, in_process=collector.kind == "single")
+        known = {key: saved[key] for key in ("best_angle", "best_score", "tried") if key in saved} if saved else {}
         run = Run(
             learner=learner,
             folder=folder,
             config=config,
-            loggers=[make(folder=folder, resumed_at=learner.steps, config=config) for make in loggers.values()],
-            ledger=Ledger(
-                folder / LEDGER,
-                processes=1 if collector.kind == "single" else collector.workers + 1,
-                simulating=learner.collection.cpu_seconds,
-                in_process=collector.kind == "single",
-            ),
+            table=MetricsTable(folder, learner.steps),
+            logger=open_logger(folder, learner.steps, config, **logger or {}),
+            ledger=ledger,
             lock=lock,
             checkpoints=checkpoints,
-            barrier_steps=collector.worlds * training.steps_per_iteration * training.barrier_iterations,
-            approximations=[*environment.approximations, *learner.agent.approximations()],
-            best_angle=saved["best_angle"] if saved is not None else 0.0,
+            iteration_steps=collector.worlds * training.steps_per_iteration,
+            approximations=[*environment.approximations, *agent.approximations()],
             trial=environment.trial,
-            tried=saved.get("tried", {}) if saved is not None else {},
-            best_score=saved.get("best_score", 0.0) if saved is not None else 0.0,
+            **known,
         )
         held.pop_all()  # it is the run's from here
     return run
@@ -163,9 +173,10 @@ def _clear(folder: Path, checkpoints: Checkpoints) -> None:
     """Delete what an earlier run has left, so that nothing of it is taken for this one's."""
     checkpoints.clear()
     policies = (folder / POLICY, folder / BEST_POLICY, *folder.glob(f"policy_[0-9]*{POLICY_SUFFIX}"))
-    for path in (folder / LEDGER, folder / FINISHED, *policies):
+    for path in (folder / LEDGER, folder / FINISHED, folder / FILM, *policies):
         path.unlink(missing_ok=True)
-    shutil.rmtree(folder / "tensorboard", ignore_errors=True)
+    for backend in ("tensorboard", "csv"):
+        shutil.rmtree(folder / backend, ignore_errors=True)
 
 
 def lock_folder(folder: Path) -> BaseFileLock:
@@ -189,84 +200,29 @@ def keep_freed_memory() -> None:
     """Tell glibc not to give memory back after each update (2 to 20 % of its time); does nothing elsewhere."""
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None) if os.name == "posix" else None
     if mallopt is not None:
-        mallopt(TRIM_THRESHOLD, 1_000_000_000)
-        mallopt(MMAP_THRESHOLD, 1_000_000_000)
-        mallopt(TOP_PAD, 200_000_000)
+        for number, size in ((TRIM_THRESHOLD, 10**9), (MMAP_THRESHOLD, 10**9), (TOP_PAD, 2 * 10**8)):
+            mallopt(number, size)
 
 
-def _build_learner(
-    seed: int,
-    environment: Environment,
-    make_agent: Callable[[Sizes], Agent],
-    collector: CollectorSettings,
-    training: TrainingSettings,
-    saved: dict[str, Any] | None,
-    make_replay: Callable[..., ReplayBuffer],
-) -> Learner:
-    """Agent, experience and workers: as a checkpoint's contents `saved` say, from `init_from`, or new."""
-    agent = make_agent(environment.sizes)
-    if saved is None and training.init_from:
-        _warm_start(agent, Path(training.init_from))
-    collection = _build_collection(environment, agent.policy(), collector, training)
-    with contextlib.ExitStack() as held:
-        held.callback(collection.close)
-        learner = Learner(
-            agent=agent,
-            replay=Replay(training.replay_size, environment.sizes, len(environment.terms), seed, make_replay),
-            collection=collection,
-            episodes=EpisodeStatistics(
-                environment.outcomes,
-                environment.terms,
-                environment.learnability() if environment.learnability is not None else None,
-            ),
-            settings=training,
-            reward_weights=environment.reward_weights,
-            seed=seed,
-        )
-        if saved is not None:
-            _fit("the run's checkpoint", lambda: learner.load_state_dict(saved["learner"]))
-        elif training.init_replay:
-            learner.replay.load_state_dict(_replay_of(training.init_from))
-        held.pop_all()
-    return learner
+def _warm_start(agent: Agent, path: Path, training: TrainingSettings) -> TrainingSettings:
+    """Begin from the networks of a checkpoint, or from a policy file's actor; gives the schedule for it.
 
-
-def _build_collection(
-    environment: Environment, actor: Actor, collector: CollectorSettings, training: TrainingSettings
-) -> Collection:
-    work = environment.make, actor, collector.worlds, training.steps_per_iteration
-    if collector.kind == "single":
-        return SingleCollection(*work)
-    return MultiSyncCollection(
-        *work, collector.workers, collector.timeout, collector.start_timeout, collector.start_method
-    )
-
-
-def _protected(training: TrainingSettings) -> TrainingSettings:
-    """The schedule, in which an actor without its critics waits until fresh ones know what it is worth.
-
-    A policy file holds the actor alone; gradients of ignorant critics would lead it astray (docs/match.md).
+    A policy file holds the actor alone, which gradients of ignorant critics would lead astray (docs/match.md): it waits
+    until fresh ones know what it is worth.
     """
-    alone = training.init_from is not None and Path(training.init_from).suffix == POLICY_SUFFIX
-    if not alone or training.actor_frozen is not None:
-        return training
-    return training.model_copy(update={"actor_frozen": FROZEN})
-
-
-def _warm_start(agent: Agent, path: Path) -> None:
-    """Begin from the networks of a checkpoint, or from a policy file's actor."""
-    if path.suffix == POLICY_SUFFIX:
-        actor, info = load_actor(path)
-        require_sizes(path, info, agent.sizes.observation, agent.sizes.action)
-        if info.hidden != agent.settings.hidden:
-            raise InputError(
-                f"training.init_from={path}: networks of other shape than agent.* asks for (hidden layers "
-                f"{list(info.hidden)}, agent.hidden is {list(agent.settings.hidden)})"
-            )
-        agent.load_actor(actor)
-    else:
+    if path.suffix != POLICY_SUFFIX:
         state = load_checkpoint(path)
         _fit(f"training.init_from={path}", lambda: agent.load_networks(state["learner"]["agent"]))
+        return training
+    actor, info = load_actor(path)
+    require_sizes(path, info, agent.sizes.observation, agent.sizes.action)
+    if info.hidden != agent.settings.hidden:
+        raise InputError(
+            f"training.init_from={path}: networks of other shape than agent.* asks for (hidden layers "
+            f"{list(info.hidden)}, agent.hidden is {list(agent.settings.hidden)})"
+        )
+    agent.load_actor(actor)
+    return training.model_copy(update={"actor_frozen": training.actor_frozen or FROZEN})
 
 
 def _replay_of(init_from: str | None) -> dict[str, Any]:

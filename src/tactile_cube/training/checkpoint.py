@@ -1,85 +1,60 @@
-"""What a run goes on from, bit for bit: the two newest checkpoints, and the replay they share."""
+"""What a run goes on from, bit for bit: the two newest checkpoints, replay included."""
 
 import hashlib
 import io
 import zipfile
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import torch
-from pydantic import BaseModel, NonNegativeInt, PositiveInt, ValidationError
+from pydantic import BaseModel, ConfigDict, NonNegativeInt, PositiveInt, ValidationError, model_validator
 from torch import Tensor
 
 from tactile_cube.drivetrain.plain_yaml import describe
 from tactile_cube.errors import InputError
-from tactile_cube.training.replay import ReplayFiles, Segment
+from tactile_cube.run_folder import CHECKPOINT
 from tactile_cube.untrusted_file import regular
 from tactile_cube.whole_file import sync_folder, write_whole
 
-FILE, BEFORE = "checkpoint.pt", "checkpoint_before.pt"
-HEAD = b"tactile_cube checkpoint 3, sha256 "
+FILE, BEFORE = CHECKPOINT, "checkpoint_before.pt"
+HEAD = b"tactile_cube checkpoint 4, sha256 "
 """First words of a file; its checksum follows, then a line break, then what torch.save wrote."""
-FREE_KEYS = {
-    "training.steps",
-    "training.policy_every",
-    "training.usual_steps",
-    "training.trial_every",
-    "training.trial_episodes",
-    "training.log_iterations",
-    "training.resume",
-    "training.stop_if_no_regrasp_by",
-    "training.regrasp_angle",
-    "training.stop_when_angle_above",
-    "training.stop_when_kept_above",
-    "training.init_from",
-    "own_effects",
-    "collector.timeout",
-    "collector.start_timeout",
-    "collector.start_method",
+FREE = {
+    "training": "steps policy_every reference trial_every trial_episodes log_iterations resume stop_if_no_regrasp_by "
+    "regrasp_angle stop_when_angle_above stop_when_kept_above init_from",
+    "collector": "timeout start_timeout start_method",
 }
+FREE_KEYS = {"own_effects", "logger"} | {f"{group}.{key}" for group, keys in FREE.items() for key in keys.split()}
 """Settings that may change between the sessions of a run: they do not touch what is learned from an iteration."""
 
 
 class Checkpoints:
-    """The checkpoints of a run folder: the newest, the one before in case that is damaged, and the replay's rows."""
+    """The checkpoints of a run folder: the newest, and the one before in case that is damaged."""
 
     def __init__(self, folder: Path):
-        self.folder = folder
-        self.notice = ""
-        self._replay = ReplayFiles(folder)
-        self._segments: list[Segment] = []
+        self.folder, self.notice = folder, ""
 
     def save(self, state: dict[str, Any]) -> None:
-        """Write a state whose `["learner"]["replay"]` is that of a `Replay`; a crash leaves the one before.
+        """Write a state; a crash leaves the one before.
 
         Raises:
             InputError: it cannot be written, for instance because the disk is full.
         """
-        path = self.folder / FILE
+        path, aside = self.folder / FILE, self.folder / "checkpoint_next.pt"
         try:
-            replay = dict(state["learner"]["replay"])
-            rows = replay.pop("rows")
-            segments = self._replay.append(rows, replay["written"], replay["capacity"])
-            replay |= {"segments": segments, "width": rows.shape[1]}
-            self._write(path, state | {"learner": state["learner"] | {"replay": replay}})
-            self._replay.delete_all_but([*self._segments, *segments])
+            stream = io.BytesIO()
+            torch.save(state, stream)
+            content = stream.getbuffer()
+            write_whole(aside, HEAD, hashlib.sha256(content).hexdigest().encode(), b"\n", content)
+            if path.exists():
+                path.replace(self.folder / BEFORE)
+            aside.replace(path)
+            sync_folder(self.folder)
         except OSError as error:
             raise InputError(
                 f"{path}: cannot be written ({error.strerror or error}); is the disk full? The checkpoint before it is "
                 "whole, and the same command goes on from there"
             ) from error
-        self._segments = segments
-
-    def _write(self, path: Path, state: dict[str, Any]) -> None:
-        stream = io.BytesIO()
-        torch.save(state, stream)
-        content = stream.getbuffer()
-        aside = self.folder / "checkpoint_next.pt"
-        write_whole(aside, HEAD, hashlib.sha256(content).hexdigest().encode(), b"\n", content)
-        if path.exists():
-            path.replace(self.folder / BEFORE)
-        aside.replace(path)
-        sync_folder(self.folder)
 
     def load(self) -> dict[str, Any] | None:
         """The newest whole checkpoint, or None where there never was one; `notice` says if it is not the newest.
@@ -87,51 +62,47 @@ class Checkpoints:
         Raises:
             InputError: all that there are are damaged.
         """
-        self.notice = ""
+        self.notice, newest = "", self.folder / FILE
         refusals: list[InputError] = []
-        for path in (self.folder / FILE, self.folder / BEFORE):
+        for path in (newest, self.folder / BEFORE):
             if path.is_dir():
                 raise InputError(f"{path}: is a folder, where a checkpoint of the run belongs; move it away")
+            if not path.is_file():
+                continue
             try:
-                state = self._load(path) if path.is_file() else None
+                state = load_checkpoint(path)
             except InputError as error:
                 refusals.append(error)
                 continue
-            if state is not None:
-                if path.name == BEFORE:
-                    self._go_back(path, refusals)
-                return state
+            if path != newest:
+                reason = refusals[0] if refusals else f"{newest}: was not finished"
+                self.notice = f"{reason}; the run goes on from the checkpoint before it"
+                path.replace(newest)  # else the next checkpoint would replace the whole one and keep the damaged one
+            return state
         if refusals:
             raise InputError(f"{refusals[0]}; training.resume=never starts over")
         return None
-
-    def _load(self, path: Path) -> dict[str, Any]:
-        state = load_checkpoint(path)
-        replay = state["learner"]["replay"]
-        segments = [tuple(segment) for segment in replay["segments"]]
-        replay["rows"] = self._replay.read(segments, replay["written"], replay["capacity"], replay["width"])
-        self._segments = segments
-        return state
-
-    def _go_back(self, path: Path, refusals: list[InputError]) -> None:
-        newest = self.folder / FILE
-        reason = refusals[0] if refusals else f"{newest}: was not finished"
-        self.notice = f"{reason}; the run goes on from the checkpoint before it"
-        path.replace(newest)  # else the next checkpoint would replace the whole one and keep the damaged one
 
     def clear(self) -> None:
         """Delete them all, to start over."""
         for name in (FILE, BEFORE):
             (self.folder / name).unlink(missing_ok=True)
-        self._replay.clear()
 
 
 class _Ring(BaseModel):
+    model_config = ConfigDict(arbitrary_types_allowed=True)
+
     written: NonNegativeInt
     capacity: PositiveInt
-    width: PositiveInt
-    segments: list[tuple[NonNegativeInt, PositiveInt, str]]
+    transitions: list[Tensor]
     generator: Any
+
+    @model_validator(mode="after")
+    def _holds_what_it_claims(self) -> Self:
+        claimed = min(self.written, self.capacity)
+        if any(part.shape[:1] != (claimed,) for part in self.transitions) or not self.transitions:
+            raise ValueError(f"claims {claimed} transitions that it does not hold")
+        return self
 
 
 class _Learner(BaseModel):
@@ -159,23 +130,20 @@ def load_checkpoint(path: Path) -> dict[str, Any]:
             raise ValueError("of another version of this program; begin with its policy.safetensors")
         if head != HEAD + hashlib.sha256(content).hexdigest().encode() + b"\n":
             raise ValueError("its checksum is wrong or missing")
-        _require_uncompressed(content)
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            for packed in archive.filelist:
+                if packed.compress_type != zipfile.ZIP_STORED or packed.file_size > len(content):
+                    raise ValueError("its parts are compressed or larger than the file")
         state: dict[str, Any] = torch.load(io.BytesIO(content), weights_only=True)
         _State.model_validate(state)
-        _require_sound(state["learner"]["agent"], "agent", len(content))
+        for part in ("agent", "replay"):
+            _require_sound(state["learner"][part], part, len(content))
     except ValidationError as error:
         raise InputError(f"{path}: damaged checkpoint ({describe(error)})") from error
     except Exception as error:  # torch raises half a dozen kinds for damaged files
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise InputError(f"{path}: damaged checkpoint ({reason})") from error
     return state
-
-
-def _require_uncompressed(content: memoryview) -> None:
-    """Refuse an archive whose parts would grow when they are read."""
-    with zipfile.ZipFile(io.BytesIO(content)) as archive:
-        if any(part.compress_type != zipfile.ZIP_STORED or part.file_size > len(content) for part in archive.filelist):
-            raise ValueError("its parts are compressed or larger than the file")
 
 
 def _require_sound(part: Any, place: str, size: int) -> None:
@@ -192,11 +160,12 @@ def require_same_settings(path: Path, saved: dict[str, Any], now: dict[str, Any]
     """Refuse to go on with settings that change what is learned."""
     before, after = _flat(saved), _flat(now)
     keys = sorted(key for key in before.keys() | after.keys() if before.get(key) != after.get(key))
-    changed = [f"{key} was {before.get(key)}, is {after.get(key)}" for key in keys if key not in FREE_KEYS]
-    if changed:
-        more = f" and {len(changed) - 3} more" if len(changed) > 3 else ""
+    bound = [key for key in keys if not {key, key.rpartition(".")[0]} & FREE_KEYS]
+    if bound:
+        changed = "; ".join(f"{key} was {before.get(key)}, is {after.get(key)}" for key in bound[:3])
+        more = f" and {len(bound) - 3} more" if len(bound) > 3 else ""
         raise InputError(
-            f"{path}: saved with other settings ({'; '.join(changed[:3])}{more}); give the run another name=<name> or "
+            f"{path}: saved with other settings ({changed}{more}); give the run another name=<name> or "
             "start over with training.resume=never"
         )
 
@@ -204,7 +173,5 @@ def require_same_settings(path: Path, saved: dict[str, Any], now: dict[str, Any]
 def _flat(tree: Any, prefix: str = "") -> dict[str, Any]:
     if not isinstance(tree, dict):
         return {prefix: tree}
-    result: dict[str, Any] = {}
-    for key, value in tree.items():
-        result |= _flat(value, f"{prefix}.{key}" if prefix else str(key))
-    return result
+    named = ((f"{prefix}.{key}" if prefix else str(key), value) for key, value in tree.items())
+    return {name: leaf for key, value in named for name, leaf in _flat(value, key).items()}

@@ -5,37 +5,30 @@ generator and the worlds' own, and `restart` sets both.
 """
 
 import contextlib
-import copy
-import multiprocessing
+import ctypes
 import os
+import pickle
+import signal
 import time
 from collections.abc import Callable
-from concurrent.futures import Future, TimeoutError
-from functools import partial
+from multiprocessing.connection import Connection, wait
+from pathlib import Path
 from typing import Any
 
 import torch
-from tensordict import TensorDict, TensorDictBase
+from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
-from torchrl.collectors import Collector, MultiSyncCollector
+from torchrl.collectors import Collector
 from torchrl.envs import EnvBase
 
 from tactile_cube.agent.networks import Actor
 from tactile_cube.env import Conditions
-from tactile_cube.training.worker_process import Background, WeightSync, cpu_seconds, prepare_worker
+from tactile_cube.training.settings import CollectorSettings
 
 MakeEnv = Callable[..., EnvBase]
-"""make_env(worlds=n, seed=s) -> batched environment of n worlds with a method set_progress(steps, performance)."""
-
+"""make_env(worlds=n, seed=s) -> batched environment of n worlds whose first transform is a `Curriculum`."""
 Progress = tuple[Any, ...]
-"""What a curriculum goes by: environment steps so far, and mean final angle [rad] of the last episodes; where constants
-are steered also the odds of their parts."""
-
-
-GLANCE = 0.5
-"""How long a dead worker may go unnoticed [s]; siblings that inherited its pipe would hide its death for ever."""
-LAST_START = 3.0
-"""How long a start that is given up may go on making processes [s]."""
+"""What `Curriculum.set_progress` takes."""
 
 
 class CollectionError(RuntimeError):
@@ -43,10 +36,9 @@ class CollectionError(RuntimeError):
 
 
 class Behaviour(TensorDictModuleBase):  # type: ignore[misc]
-    """The stochastic actor, its own copy, or uniform actions in the first steps of a run.
+    """The stochastic actor, or uniform actions while it is `random`, as in the first steps of a run.
 
-    Whether actions are random travels with the weights as a buffer, so that it reaches every worker in the same
-    iteration. Noise comes from torch's global generator of the worker.
+    Noise comes from torch's global generator of the process.
     """
 
     in_keys = ["observation"]  # noqa: RUF012 - the name and type TorchRL asks for
@@ -54,8 +46,7 @@ class Behaviour(TensorDictModuleBase):  # type: ignore[misc]
 
     def __init__(self, actor: Actor):
         super().__init__()
-        self.actor = actor.requires_grad_(False)
-        self.register_buffer("random", torch.zeros(()))
+        self.actor, self.random = actor, False
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Sample an action for each world."""
@@ -68,17 +59,21 @@ class Behaviour(TensorDictModuleBase):  # type: ignore[misc]
 class SingleCollection:
     """All worlds in this process, stepped before the learner's updates: nothing overlaps, everything is in reach.
 
-    Arguments as of `MultiSyncCollection`.
+    Args:
+        make_env: see `MakeEnv`.
+        actor: the one that acts; `launch` gives it others' weights.
+        settings: number of worlds.
+        steps: environment steps a world and block.
+        seed: of the worlds until the first restart.
     """
 
-    def __init__(self, make_env: MakeEnv, actor: Actor, worlds: int, steps: int):
-        self._behaviour = Behaviour(copy.deepcopy(actor))
+    def __init__(self, make_env: MakeEnv, actor: Actor, settings: CollectorSettings, steps: int, seed: int = 0):
+        self._behaviour = Behaviour(actor.requires_grad_(False))
         with torch.random.fork_rng(devices=[]):  # worlds seed torch's generator, which here is the learner's too
-            self._env = make_env(worlds=worlds, seed=0)
             self._collector = Collector(
-                self._env,
+                make_env(worlds=settings.worlds, seed=seed),
                 self._behaviour,
-                frames_per_batch=worlds * steps,
+                frames_per_batch=settings.worlds * steps,
                 total_frames=-1,
                 trust_policy=True,
                 auto_register_policy_transforms=False,
@@ -88,24 +83,28 @@ class SingleCollection:
         self._block: TensorDictBase | None = None
         self._cpu = 0.0
 
-    def restart(self, seed: int, progress: Progress) -> None:
-        """Reset all worlds and seed everything random in them."""
-        self._env.set_progress(*progress)
+    def restart(self, seed: int, progress: Progress) -> int:
+        """Reset all worlds and seed everything random in them; gives the seed of a worker beside this one."""
+        self.set_progress(progress)
 
-        def seed_and_reset() -> None:
-            self._collector.set_seed(seed)
+        def seed_and_reset() -> int:
+            following: int = self._collector.set_seed(seed)
             torch.manual_seed(seed)
             self._collector.reset()
+            return following
 
-        self._aside(seed_and_reset)
+        return int(self._aside(seed_and_reset))
 
     def launch(self, actor: Actor, random: bool, progress: Progress) -> Conditions:
         """Collect one block."""
-        conditions: Conditions = self._env.set_progress(*progress)
         self._behaviour.actor.load_state_dict(actor.state_dict())
-        self._behaviour.random.fill_(float(random))
-        self._block = self._aside(lambda: next(self._blocks).clone())
+        conditions, self._block = self.collect(random, progress)
         return conditions
+
+    def collect(self, random: bool, progress: Progress) -> tuple[Conditions, TensorDictBase]:
+        """Conditions of a block, and the block."""
+        self._behaviour.random = random
+        return self.set_progress(progress), self._aside(lambda: next(self._blocks).clone())
 
     def take(self) -> TensorDictBase:
         """The block collected last."""
@@ -120,6 +119,11 @@ class SingleCollection:
         """Close the worlds."""
         self._collector.shutdown()
 
+    def set_progress(self, progress: Progress) -> Conditions:
+        """Tell the curriculum; gives the conditions of the episodes that start from here on."""
+        conditions: Conditions = self._collector.env.transform[0].set_progress(*progress)
+        return conditions
+
     def _aside(self, call: Callable[[], Any]) -> Any:
         """Run a call on the collection's own random state, as if it were another process."""
         learner_state, started = torch.get_rng_state(), time.thread_time()
@@ -133,164 +137,150 @@ class SingleCollection:
 
 
 class MultiSyncCollection:
-    """Worker processes that host several worlds each and step them while the learner updates.
+    """Worker processes, each a `SingleCollection` of several worlds, that collect while the learner updates.
 
-    Args:
-        make_env: see `MakeEnv`.
-        actor: any actor of the right sizes.
-        worlds: number of worlds in all.
-        steps: environment steps a world and block.
-        processes: worker processes; divides `worlds`.
-        timeout: longest wait for a block [s]; then the workers count as stuck.
-        start_timeout: the same up to the end of the first block: workers that start may have to compile first.
-        start_method: "fork" (Linux, fast) or "spawn".
+    Weights are in memory that all share: the learner writes them while the workers wait. A worker that is killed is
+    noticed at once, one that hangs after the time limit of the settings; TorchRL's own `MultiSyncCollector` waits for
+    either for ever.
 
     Raises:
         CollectionError: a worker failed, died or got stuck, here or in any method.
     """
 
-    def __init__(
-        self,
-        make_env: MakeEnv,
-        actor: Actor,
-        worlds: int,
-        steps: int,
-        processes: int,
-        timeout: float,
-        start_timeout: float,
-        start_method: str,
-    ):
-        self._workers, self._timeout, self._start_timeout = processes, timeout, start_timeout
-        self._started = False
-        self._behaviour, self._weights = Behaviour(copy.deepcopy(actor)), WeightSync()
-        self._thread = Background()
-        self._block: Future[TensorDictBase] | None = None
+    def __init__(self, make_env: MakeEnv, actor: Actor, settings: CollectorSettings, steps: int):
+        self._settings, self._started, self._collecting = settings, False, False
+        self._actor = actor.requires_grad_(False).share_memory()
+        context: Any = torch.multiprocessing.get_context(settings.start_method)
+        parent = None if settings.start_method == "forkserver" else os.getpid()
+        share = settings.model_copy(update={"worlds": settings.worlds // settings.workers})
+        self._pipes, self._processes = list[Connection](), list[Any]()
         self._final_cpu: float | None = None
-        self._processes: list[Any] = []
-        self._others = set(multiprocessing.active_children())
-        build = partial(self._build, make_env, worlds // processes, worlds * steps, start_method)
         try:
-            self._collector, self._blocks = self._call(build, "start")
-        except BaseException:
-            self._thread.close()
+            for index in range(settings.workers):
+                mine, its = context.Pipe()
+                work = (its, parent, make_env, self._actor, share, steps, index)
+                process = context.Process(target=_work, args=work, daemon=True)
+                self._pipes.append(mine)
+                self._processes.append(process)
+                process.start()
+                its.close()
+            self._answers("start")
+        except BaseException:  # Ctrl-C too
+            self._kill()
             raise
-        self._processes = self._collector.procs
-
-    def _build(self, make_env: MakeEnv, worlds: int, frames: int, start_method: str) -> tuple[MultiSyncCollector, Any]:
-        torch.multiprocessing.set_start_method(start_method, force=True)
-        threads = torch.get_num_threads()
-        collector = MultiSyncCollector(
-            [make_env] * self._workers,
-            self._behaviour,
-            create_env_kwargs=[{"worlds": worlds, "seed": index} for index in range(self._workers)],
-            frames_per_batch=frames,
-            total_frames=-1,
-            cat_results="stack",
-            num_threads=threads,
-            num_sub_threads=1,
-            trust_policy=True,
-            auto_register_policy_transforms=False,
-            weight_sync_schemes={"policy": self._weights},
-            init_fn=partial(prepare_worker, None if start_method == "forkserver" else os.getpid()),
-        )
-        torch.set_num_threads(threads)
-        return collector, iter(collector)
 
     def restart(self, seed: int, progress: Progress) -> None:
-        """Reset all worlds and seed everything random in them."""
-        self._set_progress(progress)
-        self._call(partial(self._collector.set_seed, seed), "restart")
+        """Reset all worlds and seed everything random in them, each worker from the seed after its neighbour's."""
+        for index in range(len(self._pipes)):
+            seed = self._ask("restart", (seed, progress), index)[0]
 
     def launch(self, actor: Actor, random: bool, progress: Progress) -> Conditions:
         """Hand the weights to the workers and let them collect one block."""
-        conditions = self._set_progress(progress)
-        self._behaviour.actor.load_state_dict(actor.state_dict())
-        self._behaviour.random.fill_(float(random))
-        weights = TensorDict.from_module(self._behaviour).data.clone()
-        self._block = self._thread.submit(partial(self._collect, weights))
+        self._actor.load_state_dict(actor.state_dict())
+        conditions: Conditions = self._ask("set_progress", (progress,))[0]
+        self._send("collect", (random, progress))
+        self._collecting = True
         return conditions
 
     def take(self) -> TensorDictBase:
         """Wait for the block begun last."""
-        assert self._block is not None, "launch first"
-        block: TensorDictBase = self._wait(self._block, "collect")
-        self._started = True
+        assert self._collecting, "launch first"
+        block: TensorDictBase = torch.cat([block for _, block in self._answers("collect")])
+        self._started, self._collecting = True, False
         return block
 
     def cpu_seconds(self) -> float:
         """CPU time of all workers since they started [s]; 0 where the system does not tell."""
-        if self._final_cpu is not None:
-            return self._final_cpu
-        return sum(map(cpu_seconds, self._processes))
+        return sum(map(_cpu_seconds, self._processes)) if self._final_cpu is None else self._final_cpu
 
     def close(self) -> None:
         """End the workers: nothing in them is worth a wait, and one that is stuck would not listen."""
         self._final_cpu = self.cpu_seconds()
         self._kill()
-        closing = self._thread.submit(partial(self._collector.shutdown, timeout=1.0, raise_on_error=False))
-        with contextlib.suppress(Exception):  # the thread is daemonic: it may stay where it is
-            closing.result(timeout=3.0)
-        self._thread.close()
 
-    def _set_progress(self, progress: Progress) -> Conditions:
-        call = partial(self._collector.map_fn, "env.set_progress", [progress] * self._workers)
-        conditions: Conditions = self._call(call, "set the curriculum")[0]
-        return conditions
+    def _ask(self, name: str, arguments: tuple[Any, ...], worker: int | None = None) -> list[Any]:
+        self._send(name, arguments, worker)
+        return self._answers({"set_progress": "set the curriculum"}.get(name, name), worker)
 
-    def _collect(self, weights: TensorDictBase) -> TensorDictBase:
-        for index, process in enumerate(self._processes):  # torchrl would hang sending weights to a dead worker
-            if not process.is_alive():
-                raise RuntimeError(f"worker {index} ended with exit code {process.exitcode}")
-        self._collector.update_policy_weights_(weights)
-        block: TensorDictBase = next(self._blocks).flatten(0, 1).clone()
-        return block
+    def _send(self, name: str, arguments: tuple[Any, ...], worker: int | None = None) -> None:
+        for pipe in self._pipes if worker is None else [self._pipes[worker]]:
+            with contextlib.suppress(OSError):  # of a worker that is dead: its answer says so
+                pipe.send((name, arguments))
 
-    def _call(self, call: Callable[[], Any], doing: str) -> Any:
-        return self._wait(self._thread.submit(call), doing)
-
-    def _wait(self, future: "Future[Any]", doing: str) -> Any:
-        name, seconds = ("timeout", self._timeout) if self._started else ("start_timeout", self._start_timeout)
+    def _answers(self, doing: str, worker: int | None = None) -> list[Any]:
+        """An answer of each worker, or of one."""
+        name = "timeout" if self._started else "start_timeout"  # workers that start may have to compile first
+        seconds = float(getattr(self._settings, name))
+        until, answers = time.monotonic() + seconds, list[Any]()
+        asked = range(len(self._pipes)) if worker is None else [worker]
         try:
-            return self._answer(future, seconds)
-        except TimeoutError:
+            for index in asked:
+                pipe, sentinels = self._pipes[index], [one.sentinel for one in self._processes]
+                ready = wait([pipe, *sentinels], max(until - time.monotonic(), 0.0))
+                if not ready:
+                    limit = f"collector.{name}={seconds:g} s (to {doing})"
+                    raise CollectionError(f"no simulation worker answered within {limit}")
+                if pipe not in ready:  # this worker or another one ended
+                    ended = self._processes[sentinels.index(ready[0])]
+                    ended.join(1.0)
+                    raise CollectionError(f"simulation worker failed to {doing}: exit code {ended.exitcode}")
+                answers.append(pickle.loads(pipe.recv_bytes()))
+                if isinstance(answers[-1], CollectionError):
+                    raise CollectionError(f"simulation worker failed to {doing}: {answers[-1]}")
+        except (EOFError, OSError):
             self._kill()
-            raise CollectionError(
-                f"no simulation worker answered within collector.{name}={seconds:g} s (to {doing})"
-            ) from None
-        except Exception as error:
-            self._kill()
-            raise CollectionError(f"simulation worker failed to {doing}: {error}") from error
+            raise CollectionError(f"simulation worker failed to {doing}: it ended") from None
         except BaseException:  # Ctrl-C: workers ignore it, and would be waited for
             self._kill()
             raise
-
-    def _answer(self, future: "Future[Any]", seconds: float) -> Any:
-        until = time.monotonic() + seconds
-        while True:
-            try:
-                return future.result(timeout=max(min(GLANCE, until - time.monotonic()), 0.0))
-            except TimeoutError:
-                if future.done() or time.monotonic() >= until:
-                    raise
-                if not all(process.is_alive() for process in self._weights.processes):
-                    self._kill()  # what waits for it, says so then
-                    until = time.monotonic() + LAST_START
+        return answers
 
     def _kill(self) -> None:
-        idle = self._thread.submit(lambda: None)  # before, it may start one more
-        until = time.monotonic() + LAST_START
-        while not idle.done() and time.monotonic() < until:
-            self._kill_children()
-            with contextlib.suppress(TimeoutError):
-                idle.result(timeout=0.05)
-        self._kill_children()
-
-    def _kill_children(self) -> None:
-        # also those of a start that did not come to its end: they would be waited for when the program ends
-        for process in set(multiprocessing.active_children()) - self._others:
-            process.kill()
-            process.join(1.0)
+        for process in self._processes:
+            if process.pid is not None:
+                process.kill()
+                process.join(1.0)
+        for pipe in self._pipes:
+            pipe.close()
 
 
 Collection = SingleCollection | MultiSyncCollection
 """A source of blocks of experience (worlds, steps)."""
+
+
+def _work(
+    pipe: Connection,
+    parent: int | None,
+    make_env: MakeEnv,
+    actor: Actor,
+    settings: CollectorSettings,
+    steps: int,
+    index: int,
+) -> None:
+    """Answer what the main process asks of a collection, until it ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the main process
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    torch.set_num_threads(1)
+    if os.uname().sysname == "Linux":
+        pr_set_pdeathsig = 1
+        ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGKILL)  # SIGTERM would not reach a stopped process
+        if parent is not None and os.getppid() != parent:  # it ended before
+            os._exit(1)
+    with contextlib.suppress(EOFError, OSError):  # the main process is gone
+        try:
+            collection = SingleCollection(make_env, actor, settings, steps, seed=index)
+            pipe.send_bytes(pickle.dumps(None))
+            while True:
+                name, arguments = pipe.recv()
+                pipe.send_bytes(pickle.dumps(getattr(collection, name)(*arguments)))
+        except Exception as error:  # of any kind: the main process says it
+            pipe.send_bytes(pickle.dumps(CollectionError(str(error))))
+
+
+def _cpu_seconds(process: Any) -> float:
+    """User and system time of a running process [s], from /proc; 0 for one that is closed already."""
+    try:
+        fields = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()
+    except (OSError, ValueError):
+        return 0.0
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")

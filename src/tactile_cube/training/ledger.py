@@ -1,4 +1,4 @@
-"""What a run costs: CPU-hours simulating and learning, and core-hours reserved but waiting."""
+"""What a run costs: CPU-hours simulating and learning."""
 
 import json
 import time
@@ -13,19 +13,15 @@ LEDGER = "ledger.json"
 
 @dataclass
 class Costs:
-    """Seconds of one run, over all its sessions.
-
-    Attributes:
-        simulating: CPU time of the workers [s].
-        learning: CPU time of the learner [s].
-        waiting: core time [s] of workers and learner in which neither did anything.
-        wall: time on the clock [s].
-    """
+    """CPU time of the workers and of the learner, and time on the clock, of one run over all its sessions [s]."""
 
     simulating: float = 0.0
     learning: float = 0.0
-    waiting: float = 0.0
     wall: float = 0.0
+
+    def __add__(self, other: "Costs") -> "Costs":
+        """Spent together."""
+        return Costs(self.simulating + other.simulating, self.learning + other.learning, self.wall + other.wall)
 
 
 class Ledger:
@@ -33,31 +29,23 @@ class Ledger:
 
     Args:
         path: ledger.json of the run folder.
-        processes: processes the run occupies, the learner included.
         simulating: CPU seconds simulated in this session so far.
         in_process: whether simulation runs in the learner's process, and its time is contained in the learner's.
     """
 
-    def __init__(self, path: Path, processes: int, simulating: Callable[[], float], in_process: bool):
+    def __init__(self, path: Path, simulating: Callable[[], float], in_process: bool):
         self.path, self.before = path, read_costs(path)
-        self._processes, self._simulating, self._in_process = processes, simulating, in_process
+        self._simulating, self._in_process = simulating, in_process
         self._wall, self._cpu = time.perf_counter(), time.process_time()
 
     def costs(self) -> Costs:
         """Spent by this run until now."""
-        wall = time.perf_counter() - self._wall
         simulating = self._simulating()
         learning = time.process_time() - self._cpu - (simulating if self._in_process else 0.0)
-        waiting = max(self._processes * wall - simulating - learning, 0.0)
-        return Costs(
-            self.before.simulating + simulating,
-            self.before.learning + learning,
-            self.before.waiting + waiting,
-            self.before.wall + wall,
-        )
+        return self.before + Costs(simulating, learning, time.perf_counter() - self._wall)
 
     def write(self, steps: int) -> None:
-        """Put the costs into the run folder, in hours as in the paper."""
+        """Put the costs into the run folder."""
         write_costs(self.path, steps, self.costs())
 
 

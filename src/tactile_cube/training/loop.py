@@ -6,7 +6,6 @@ section III). At barriers all worlds are reset from a seed that follows from the
 the only place at which a run can be saved and resumed bit for bit, because the state of a simulator cannot be saved.
 """
 
-import copy
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -66,21 +65,28 @@ class Learner:
         self.conditions = self.collection.launch(self.agent.policy(), random, self._progress())
         weights = self.reward_weights(self.conditions)
         if self.steps >= self.settings.learning_starts:
-            self._learn(weights)
+            frozen = self.agent.policy() if self.updates < (self.settings.actor_frozen or 0) else None
+            for _ in range(self.settings.updates_per_iteration):
+                self.metrics = self.agent.update(self.replay.sample(self.agent.settings.batch_size, weights))
+                if frozen is not None:
+                    self.agent.load_actor(frozen)
+            self.updates += self.settings.updates_per_iteration
         block = self.collection.take()
-        _require_finite(block)
+        self._require_finite(block)
         self.replay.extend(self.assembler.add(block))
         self.episodes.add(block, weights)
         self.steps += block.numel()
         self.iteration += 1
 
-    def _learn(self, weights: Tensor) -> None:
-        frozen = copy.deepcopy(self.agent.policy()) if self.updates < (self.settings.actor_frozen or 0) else None
-        for _ in range(self.settings.updates_per_iteration):
-            self.metrics = self.agent.update(self.replay.sample(self.agent.settings.batch_size, weights))
-            if frozen is not None:
-                self.agent.load_actor(frozen)
-        self.updates += self.settings.updates_per_iteration
+    @staticmethod
+    def _require_finite(block: TensorDictBase) -> None:
+        """Refuse what would poison replay and networks for good; steps marked as faulty never get there."""
+        sound = ~block["next", "faulty"].squeeze(-1)
+        for entries in (block, block["next"]):
+            for key in ("observation", "privileged", "action", "reward_terms"):
+                value = entries.get(key, None)
+                if value is not None and not torch.isfinite(value[sound]).all():
+                    raise CollectionError(f"simulation worker sent values of {key!r} that are not finite")
 
     def _progress(self) -> Progress:
         worlds = self.episodes.worlds
@@ -107,17 +113,6 @@ class Learner:
         torch.set_rng_state(state["random_state"])
         if torch.cuda.is_available() and state["cuda_random_state"]:
             torch.cuda.set_rng_state_all(state["cuda_random_state"])
-
-
-def _require_finite(block: TensorDictBase) -> None:
-    """Refuse what would poison replay and networks for good; steps marked as faulty never get there."""
-    following = block["next"]
-    sound = ~following["faulty"].squeeze(-1)
-    for entries in (block, following):
-        for key in ("observation", "privileged", "action", "reward_terms"):
-            value = entries.get(key, None)
-            if value is not None and not torch.isfinite(value[sound]).all():
-                raise CollectionError(f"simulation worker sent values of {key!r} that are not finite")
 
 
 def barrier_seed(seed: int, iteration: int) -> int:

@@ -4,24 +4,30 @@ import contextlib
 import gc
 import json
 import signal
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
 from filelock import BaseFileLock
+from torchrl.record.loggers.common import Logger
 
 from tactile_cube.agent.networks import Actor
 from tactile_cube.agent.policy_file import PolicyInfo, current_commit, save_policy
 from tactile_cube.training.checkpoint import Checkpoints
 from tactile_cube.training.collection import CollectionError
 from tactile_cube.training.ledger import Ledger
-from tactile_cube.training.loggers import MetricLogger, ProgressLine
+from tactile_cube.training.loggers import MetricsTable, ProgressLine, log_film
 from tactile_cube.training.loop import Learner
-from tactile_cube.training.trial import ENGINES, MEASURED, SCORE
+from tactile_cube.training.trial import SCORE
 from tactile_cube.whole_file import write_whole
 
-FILE = "finished.json"
+FILE, POLICY, BEST_POLICY, FILM = "finished.json", "policy.safetensors", "policy_best.safetensors", "trial.gif"
+INTERRUPTED = "interrupted"
+MASTERED = "mastered:"
+"""How the reason begins for which a run ended that came to its goal."""
+ATTEMPTS = 3
+"""Times in a row that workers may fail without a barrier reached in between."""
 
 
 @dataclass(frozen=True)
@@ -45,14 +51,8 @@ class Finished:
         except (OSError, ValueError, TypeError):
             return None
         # by way of JSON, in which tuples are lists
-        same = found.config == json.loads(json.dumps(config)) and (folder / "policy.safetensors").is_file()
+        same = found.config == json.loads(json.dumps(config)) and (folder / POLICY).is_file()
         return found if same and config["training"]["resume"] != "never" else None
-
-
-INTERRUPTED = "interrupted"
-MASTERED = "mastered:"
-"""How the reason begins for which a run ended that came to its goal."""
-POLICY, BEST_POLICY = "policy.safetensors", "policy_best.safetensors"
 
 
 @dataclass
@@ -61,12 +61,13 @@ class Run:
 
     Attributes:
         config: resolved configuration, kept in checkpoints and policy files.
+        table: takes rows of metrics, as `logger` does; None: there is none.
         lock: keeps other processes out of the folder.
-        barrier_steps: environment steps from one barrier, and so one checkpoint, to the next.
+        iteration_steps: environment steps of an iteration.
         approximations: which shortcuts are on, in words.
+        trial: tries the policy in so many episodes every `training.trial_every` steps and films one; None: none.
         best_angle: largest mean final angle at a barrier so far [rad].
-        trial: tries the policy every `training.trial_every` steps; None: nothing does.
-        tried: what it found last.
+        tried: what the trial found last.
         best_score: the largest score so far; the best policy has it.
         saved_at: environment steps at the last checkpoint.
         total: environment steps in all: those asked for, in whole iterations.
@@ -75,31 +76,32 @@ class Run:
     learner: Learner
     folder: Path
     config: dict[str, Any]
-    loggers: Sequence[MetricLogger]
+    table: MetricsTable
+    logger: Logger | None
     ledger: Ledger
     lock: BaseFileLock
     checkpoints: Checkpoints
-    barrier_steps: int
+    iteration_steps: int
     approximations: list[str]
-    best_angle: float
-    trial: Callable[[Actor, int], dict[str, float]] | None = None
+    trial: Callable[[Actor, int, Path], dict[str, float]] | None = None
+    best_angle: float = 0.0
     tried: dict[str, float] = field(default_factory=dict)
     best_score: float = 0.0
 
     def __post_init__(self) -> None:
         """A session begins."""
-        settings = self.learner.settings
-        iteration = self.barrier_steps // settings.barrier_iterations
-        self.total = -(-settings.steps // iteration) * iteration
-        self.line = ProgressLine(self.total, self.learner.steps, self.learner.updates, settings.usual_steps)
+        learner, settings = self.learner, self.learner.settings
+        self.total = -(-settings.steps // self.iteration_steps) * self.iteration_steps
+        self.line = ProgressLine(self.total, learner.steps, learner.updates, settings.reference)
         self.commit = current_commit()
-        self.saved_at = self.learner.steps
+        self.saved_at = learner.steps
 
     def train(self) -> str:
         """Learn until done, stopped or interrupted by Ctrl-C or SIGTERM; gives the reason in words."""
         reason = self._reason_to_stop()
-        signals = (signal.SIGINT, signal.SIGTERM)
-        before = [signal.signal(number, signal.default_int_handler) for number in signals]
+        before = {
+            number: signal.signal(number, signal.default_int_handler) for number in (signal.SIGINT, signal.SIGTERM)
+        }
         try:
             if not reason and not self.learner.iteration:
                 self._save()  # from here it goes on when something happens before the first barrier
@@ -111,7 +113,7 @@ class Run:
         except KeyboardInterrupt:
             reason = INTERRUPTED
         finally:
-            for number, handler in zip(signals, before, strict=True):
+            for number, handler in before.items():
                 signal.signal(number, handler)
         return reason
 
@@ -121,8 +123,8 @@ class Run:
         start = f"goes on at {learner.steps} steps" if learner.steps else "starts"
         self.line.say(f"{self.folder}: {start}, {self.total} steps in all")
         self.line.say(
-            f"saved every {self.barrier_steps} steps; after Ctrl-C the same command goes on from the last time, "
-            "and does the steps since then again"
+            f"saved every {self.iteration_steps * settings.barrier_iterations} steps; after Ctrl-C the same command "
+            "goes on from the last time, and does the steps since then again"
         )
         if self.checkpoints.notice:
             self.line.say(self.checkpoints.notice)
@@ -152,27 +154,26 @@ class Run:
         """End the workers and write what is still in memory."""
         with contextlib.ExitStack() as stack:  # in reverse, each even if the one before fails
             stack.callback(self.lock.release)
-            for logger in self.loggers:
-                stack.callback(logger.close)
+            stack.callback(self.table.close)
+            if self.logger is not None:
+                stack.callback(self.logger.close)
             stack.callback(self.learner.collection.close)
             self.ledger.write(self.saved_at)  # first: the workers take their CPU time with them
 
     def _after_iteration(self) -> None:
         learner = self.learner
         assert learner.conditions is not None, "iterate first"
-        conditions = learner.conditions.columns()
-        summary = learner.episodes.summary()
+        conditions, summary = learner.conditions.columns(), learner.episodes.summary()
         self.line.show(learner.steps, learner.updates, summary, conditions)
         if learner.iteration % learner.settings.log_iterations == 0:
             losses = {key: float(value) for key, value in learner.metrics.items()}
-            trial = {f"trial_{name}": self.tried.get(name, float("nan")) for name in self._tried_names()}
+            trial = {f"trial_{name}": value for name, value in self.tried.items()}
             costs = self.ledger.costs()
-            hours = {"simulating_hours": costs.simulating / 3600, "learning_hours": costs.learning / 3600}
-            # losses last: the columns of metrics.csv are those of the first row, so they must be there from the start
-            blank = dict.fromkeys(("critic_loss", "actor_loss", "alpha", "entropy", "value"), float("nan"))
-            counts = {"updates": learner.updates, "wall_hours": costs.wall / 3600}
-            for logger in self.loggers:
-                logger.log(learner.steps, summary | conditions | counts | hours | trial | blank | losses)
+            hours = {f"{name}_hours": getattr(costs, name) / 3600 for name in ("wall", "simulating", "learning")}
+            row = summary | conditions | {"updates": learner.updates} | hours | losses | trial
+            self.table.add(learner.steps, row)
+            if self.logger is not None:
+                self.logger.log_metrics(row, step=learner.steps)
 
     def _reason_to_stop(self) -> str:
         settings, steps = self.learner.settings, self.learner.steps
@@ -185,17 +186,14 @@ class Run:
             return f"no regrasping (mean final angle never above {settings.regrasp_angle:g} rad) by {deadline} steps"
         return ""
 
-    def _tried_names(self) -> list[str]:
-        if self.trial is None or not self.learner.settings.trial_every:
-            return []
-        return [SCORE, *(f"{engine}_{name}" for engine in ENGINES for name in MEASURED)]
-
     def _try(self) -> None:
         """Try the policy if it is time, and keep it if it is the best so far."""
-        learner, every = self.learner, self.learner.settings.trial_every
+        learner, every, film = self.learner, self.learner.settings.trial_every, self.folder / FILM
         if self.trial is None or not every or learner.steps // every == self.saved_at // every:
             return
-        self.tried = self.trial(learner.agent.policy(), learner.settings.trial_episodes)
+        self.tried = self.trial(learner.agent.policy(), learner.settings.trial_episodes, film)
+        if self.logger is not None and film.is_file():
+            log_film(self.logger, film, learner.steps)
         parts = (f"{name} {value:.3g}" for name, value in self.tried.items() if not name.endswith(("links", "return")))
         self.line.say(f"{learner.steps} steps, without exploration: {', '.join(parts)}")
         if self.tried.get(SCORE, 0.0) > self.best_score:
@@ -204,9 +202,8 @@ class Run:
 
     def _save(self) -> None:
         """Write the latest policy, the best so far, and a checkpoint."""
-        learner = self.learner
-        full_window = len(learner.episodes.angles) == learner.episodes.angles.maxlen
-        if full_window and learner.episodes.mean_angle > self.best_angle:
+        learner, angles = self.learner, self.learner.episodes.angles
+        if len(angles) == angles.maxlen and learner.episodes.mean_angle > self.best_angle:
             self.best_angle = learner.episodes.mean_angle
             if not self.best_score:  # nothing better is known
                 self._save_policy(BEST_POLICY)
@@ -220,8 +217,7 @@ class Run:
         self.ledger.write(learner.steps)
 
     def _save_policy(self, name: str) -> None:
-        learner = self.learner
-        actor = learner.agent.policy()
+        learner, actor = self.learner, self.learner.agent.policy()
         info = PolicyInfo.describe(
             actor,
             time_constant=learner.conditions.filter_time if learner.conditions else None,  # none at the start
@@ -232,10 +228,6 @@ class Run:
             config=self.config,
         )
         save_policy(self.folder / name, actor, info)
-
-
-ATTEMPTS = 3
-"""Times in a row that workers may fail without a barrier reached in between."""
 
 
 def train_on(build: Callable[[], Run], again: Callable[[], Run] | None = None) -> tuple[Run, str]:

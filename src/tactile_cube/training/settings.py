@@ -5,6 +5,9 @@ from typing import Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, NonNegativeInt, PositiveFloat, PositiveInt, model_validator
 
+Reference = tuple[tuple[int, float, float], ...]
+"""Of recorded runs: environment steps, lowest and highest mean final angle [rad] after them; the last is their end."""
+
 
 class RunSettings(BaseModel):
     """What tells runs apart: the name is part of the folder's, the seed is that of everything random."""
@@ -63,7 +66,7 @@ class TrainingSettings(BaseModel):
     random_steps: NonNegativeInt = 10_000
     replay_size: PositiveInt = 150_000
     barrier_iterations: PositiveInt = 25
-    usual_steps: PositiveInt | None = None
+    reference: Reference = ()
     policy_every: NonNegativeInt = 0
     trial_every: NonNegativeInt = 25_000
     trial_episodes: PositiveInt = 4
@@ -77,6 +80,11 @@ class TrainingSettings(BaseModel):
     stop_when_angle_above: PositiveFloat | None = None
     stop_when_kept_above: PositiveFloat | None = None
     threads: PositiveInt = 1
+
+    @property
+    def usual_steps(self) -> int:
+        """Environment steps after which recorded runs were done; all where there are none."""
+        return min(self.reference[-1][0] if self.reference else self.steps, self.steps)
 
     @property
     def goal(self) -> str:

@@ -40,17 +40,14 @@ class EpisodeStatistics:
     def add(self, block: TensorDictBase, weights: Tensor | float = 1.0) -> None:
         """Count the episodes that end in a block (worlds, steps); `weights` are those of the terms (terms,)."""
         following = block["next"]
-        ended = following["done"].squeeze(-1)
-        faulty = following["faulty"].squeeze(-1)
+        ended, faulty = (following[key].squeeze(-1) for key in ("done", "faulty"))
         if self.terms:
             weighted = following["reward_terms"].masked_fill(following["faulty"], 0.0) * weights
             self.measured.append(weighted.flatten(0, -2).mean(0).tolist())
         self.faulty += int((ended & faulty).sum())
         self.episodes += int(ended.sum())
         exploring = following.get("exploring", None)  # missing where no extra exploration is configured
-        counted = ended & ~faulty
-        if exploring is not None:
-            counted &= ~exploring.squeeze(-1)
+        counted = ended & ~faulty if exploring is None else ended & ~faulty & ~exploring.squeeze(-1)
         # time first: the deque shall hold the last episodes in the order in which they ended
         last = following.transpose(0, 1)[counted.t()]
         self.angles.extend(last["theta"].flatten().tolist())
@@ -73,20 +70,18 @@ class EpisodeStatistics:
 
     def summary(self) -> dict[str, float]:
         """Numbers for the log."""
-        count = max(len(self.lengths), 1)
         result = {
             "final_angle": self.mean_angle,
             "final_angle_best": max(self.angles, default=0.0),
-            "episode_length": sum(self.lengths) / count,
+            "episode_length": sum(self.lengths) / max(len(self.lengths), 1),
             "episodes": float(self.episodes),
             "faulty_episodes": float(self.faulty),
         }
         for code, name in enumerate(self.outcomes):
             if name not in ("running", "faulty"):
                 result[f"ended_{name}"] = self.endings.count(code) / max(len(self.endings), 1)
-        means = zip(*self.measured, strict=True) if self.measured else ([0.0] for _ in self.terms)
-        rewards = {name: sum(values) / len(values) for name, values in zip(self.terms, means, strict=True)}
-        return result | {f"reward_{name}": value for name, value in rewards.items()}
+        means = np.mean(self.measured, 0).tolist() if self.measured else [0.0] * len(self.terms)
+        return result | {f"reward_{name}": value for name, value in zip(self.terms, means, strict=True)}
 
     def state_dict(self) -> dict[str, Any]:
         """The window and the counts."""
@@ -120,7 +115,16 @@ class TransitionAssembler:
 
     def add(self, block: TensorDictBase) -> TensorDictBase:
         """Transitions (rows,) that the block completes."""
-        stream = _fields(block)
+        following = block["next"]
+        fields = {
+            "observation": block["observation"],
+            "privileged": block["privileged"],
+            # both are missing where no extra exploration is configured
+            "action": following.get("action_taken", block["action"]),
+            "demonstrated": following.get("demonstrated", torch.zeros_like(following["terminated"])),
+            "next": following.select("observation", "privileged", "reward_terms", "terminated", "done", "faulty"),
+        }
+        stream: TensorDictBase = TensorDict(fields, block.batch_size)
         if self.pending is not None:
             stream = torch.cat((self.pending, stream), 1)
         ready = max(stream.shape[1] - (self.sums.n_steps - 1), 0)
@@ -143,16 +147,3 @@ class TransitionAssembler:
         stream["next", "reward_terms"].masked_fill_(faulty, 0.0)
         summed = self.sums(stream)[:, :count][~faulty[:, :count].squeeze(-1)]
         return summed.set("steps_to_next_obs", summed["steps_to_next_obs"].unsqueeze(-1))
-
-
-def _fields(block: TensorDictBase) -> TensorDict:
-    following = block["next"]
-    fields = {
-        "observation": block["observation"],
-        "privileged": block["privileged"],
-        # both are missing where no extra exploration is configured
-        "action": following.get("action_taken", block["action"]),
-        "demonstrated": following.get("demonstrated", torch.zeros_like(following["terminated"])),
-        "next": following.select("observation", "privileged", "reward_terms", "terminated", "done", "faulty"),
-    }
-    return TensorDict(fields, block.batch_size)

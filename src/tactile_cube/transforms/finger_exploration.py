@@ -99,55 +99,53 @@ class FingerExploration(Transform):  # type: ignore[misc]
         self._groups, self._per_finger = finger_groups(fingers, exploration.single), joints_per_finger
         self._joints = fingers * joints_per_finger
         self._gaits = torch.zeros(1, 1, self._joints) if gaits is None else gaits
-        self._exploring = self._demonstrating = self._demonstrated = self._held = torch.zeros(0)
-        self._gait = self._clock = self._target = self._fingers = self._taken = torch.zeros(0)
+        self._state: dict[str, Tensor] = {}
 
     def _reset(self, tensordict: TensorDictBase, tensordict_reset: TensorDictBase) -> TensorDictBase:
         mask = reset_mask(tensordict, tensordict_reset)
-        worlds = mask.shape[:-1]
-        if self._exploring.shape != mask.shape:
-            self._exploring = self._demonstrating = self._demonstrated = torch.zeros_like(mask)
-            self._held = self._gait = self._clock = torch.zeros_like(mask, dtype=torch.int64)
-            self._target = self._taken = torch.zeros(*worlds, self._joints)
-            self._fingers = torch.zeros(*worlds, self._joints, dtype=torch.bool)
-        draw = torch.rand(mask.shape)
-        demonstrating = (draw >= self.settings.episodes) & (draw < self.settings.extra)
-        self._exploring = torch.where(mask, draw < self.settings.extra, self._exploring)
-        self._demonstrating = torch.where(mask, demonstrating, self._demonstrating)
-        self._gait = torch.where(mask, torch.randint(len(self._gaits), mask.shape), self._gait)
-        self._clock = self._clock.masked_fill(mask, 0)
-        self._held = self._held.masked_fill(mask, 0)
-        self._demonstrated = self._demonstrated & ~mask
-        self._taken = self._taken.masked_fill(mask, 0.0)
+        draw, settings, joints = torch.rand(mask.shape), self.settings, torch.zeros(*mask.shape[:-1], self._joints)
+        fresh = {
+            "exploring": draw < settings.extra,
+            "demonstrating": (draw >= settings.episodes) & (draw < settings.extra),
+            "gait": torch.randint(len(self._gaits), mask.shape),
+            "clock": torch.zeros(mask.shape, dtype=torch.int64),
+            "held": torch.zeros(mask.shape, dtype=torch.int64),
+            "demonstrated": torch.zeros_like(mask),
+            "taken": joints,
+            "target": joints,
+            "fingers": joints.bool(),
+        }
+        self._state = {key: torch.where(mask, one, self._state.get(key, one)) for key, one in fresh.items()}
         return self._call(tensordict_reset)
 
     def _inv_call(self, tensordict: TensorDictBase) -> TensorDictBase:
-        policy = tensordict.get("action")
+        policy, state, settings = tensordict.get("action"), self._state, self.settings
         self._begin(policy.shape[:-1])
-        gait = self._gaits[self._gait, self._clock].squeeze(-2)
-        shown = gait + self.settings.noise * torch.randn(policy.shape)
-        usual = torch.where(self._demonstrating, shown.clamp(-1.0, 1.0), policy)
-        instead = torch.where(self._demonstrating, policy, torch.where(self._fingers, self._target, policy))
-        self._taken = torch.where(self._held > 0, instead, usual)
-        self._demonstrated = self._demonstrating & (self._held == 0)
-        self._held = (self._held - 1).clamp_min(0)
-        self._clock = (self._clock + 1).clamp_max(self._gaits.shape[1] - 1)
-        return tensordict.set("action", self._taken)
+        gait = self._gaits[state["gait"], state["clock"]].squeeze(-2)
+        shown = (gait + settings.noise * torch.randn(policy.shape)).clamp(-1.0, 1.0)
+        showing, holding = state["demonstrating"], state["held"] > 0
+        usual = torch.where(showing, shown, policy)
+        instead = torch.where(~showing & state["fingers"], state["target"], policy)
+        state["taken"] = torch.where(holding, instead, usual)
+        state["demonstrated"] = showing & ~holding
+        state["held"] = (state["held"] - 1).clamp_min(0)
+        state["clock"] = (state["clock"] + 1).clamp_max(self._gaits.shape[1] - 1)
+        return tensordict.set("action", state["taken"])
 
     def _begin(self, worlds: torch.Size) -> None:
         """Lets exploring worlds that hold nothing begin to hold, with the probability of a step."""
-        begins = (torch.rand(*worlds, 1) < self.settings.probability) & self._exploring & (self._held == 0)
-        steps = torch.randint(self.settings.shortest, self.settings.longest + 1, (*worlds, 1))
+        state, settings = self._state, self.settings
+        begins = (torch.rand(*worlds, 1) < settings.probability) & state["exploring"] & (state["held"] == 0)
+        steps = torch.randint(settings.shortest, settings.longest + 1, (*worlds, 1))
         fingers = self._groups[torch.randint(len(self._groups), worlds)].repeat_interleave(self._per_finger, dim=-1)
         target = 2.0 * torch.rand(*worlds, self._joints) - 1.0
-        self._held = torch.where(begins, steps, self._held)
-        self._fingers = torch.where(begins, fingers, self._fingers)
-        self._target = torch.where(begins, target, self._target)
+        for key, value in {"held": steps, "fingers": fingers, "target": target}.items():
+            state[key] = torch.where(begins, value, state[key])
 
     def _call(self, next_tensordict: TensorDictBase) -> TensorDictBase:
-        next_tensordict.set("exploring", self._exploring)
-        next_tensordict.set("demonstrated", self._demonstrated)
-        return next_tensordict.set("action_taken", self._taken)
+        next_tensordict.set("exploring", self._state["exploring"])
+        next_tensordict.set("demonstrated", self._state["demonstrated"])
+        return next_tensordict.set("action_taken", self._state["taken"])
 
     def transform_observation_spec(self, observation_spec: Composite) -> Composite:
         """Adds the three keys."""

@@ -16,7 +16,7 @@ from torchrl.envs.transforms import CatFrames, CatTensors, Compose, ObservationN
 
 from tactile_cube.drivetrain.effects import Effect, parse_effect, resolve
 from tactile_cube.drivetrain.model_file import as_model
-from tactile_cube.env import Curriculum, Reward, RotationEnv, Task
+from tactile_cube.env import Reward, RotationEnv, Task
 from tactile_cube.env.worlds import WorldsEnv
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, Hand
@@ -24,6 +24,7 @@ from tactile_cube.hand.gait import similar_gaits
 from tactile_cube.randomization import GraspStarts, GraspTable, Randomization, StartPoses, StartStates, identified
 from tactile_cube.simulation import EpisodeConstants, SimulationOptions, World
 from tactile_cube.simulation.health import unresolved
+from tactile_cube.transforms.curriculum import Curriculum, Ramps
 from tactile_cube.transforms.disturbances import JointOffset, SensorNoise, StickyAction
 from tactile_cube.transforms.finger_exploration import Exploration, FingerExploration
 
@@ -100,7 +101,7 @@ class EnvConfig:
     randomization: Randomization = field(default_factory=Randomization)
     start: StartStates | GraspStarts = field(default_factory=StartStates)
     exploration: Exploration = field(default_factory=lambda: Exploration(episodes=0.0))
-    curriculum: Curriculum | None = None
+    curriculum: Ramps | None = None
     constants: EpisodeConstants = field(default_factory=EpisodeConstants)
     simulation: SimulationOptions = field(default_factory=SimulationOptions)
     effects: Sequence[Any] = ()
@@ -116,7 +117,13 @@ class EnvConfig:
             if not isinstance(getattr(self, key), kinds):
                 names = " or ".join(kind.__name__ for kind in kinds)
                 raise InputError(f"env.{key} is {str(getattr(self, key))[:60]}; give a {names}")
-        effects = [one for effect in self.effects for one in _placed_effects(effect, self.hand)]
+        effects = list[Effect]()
+        for effect in self.effects:
+            if isinstance(effect, Effect):
+                effects.append(effect)
+            else:  # a text names one for each joint that matches
+                name, values = parse_effect(effect)
+                effects += [kind(joint, **values) for kind, joint in resolve([name], self.hand.joint_names)]
         if self.constants.joints != self.hand.joints:
             raise InputError(
                 f"env.constants are of {self.constants.joints} joints, hand '{self.hand.name}' has {self.hand.joints}; "
@@ -163,9 +170,8 @@ def make_env(config: EnvConfig, worlds: int, seed: int, evaluation: bool = False
     # processes, told apart by their seed, take turns in the engines too
     of_worlds = [replace(config, simulation=config.simulation.of_world(seed + index)) for index in range(worlds)]
     tasks = [rotation_env(one, poses) for one in of_worlds]
-    base = WorldsEnv(tasks, None if evaluation else config.curriculum)
     kind = OwnGeneratorEnv if evaluation else TransformedEnv
-    env = kind(base, Compose(*transforms(config, explore=not evaluation)))
+    env = kind(WorldsEnv(tasks), Compose(*transforms(config, explore=not evaluation)))
     env.set_seed(seed)
     return env
 
@@ -178,11 +184,15 @@ def rotation_env(config: EnvConfig, poses: StartPoses | GraspTable | None = None
 
 
 def transforms(config: EnvConfig, explore: bool) -> list[Transform]:
-    """The transforms, from the world to the policy: readings pass them downwards, actions upwards."""
+    """The transforms, from the world to the policy: readings pass them downwards, actions upwards.
+
+    Those of training alone, the first and the last, only with `explore`.
+    """
     disturbances, hand = config.randomization, config.hand
     half_range = torch.tensor(0.5 * (hand.action_upper - hand.action_lower), dtype=torch.float32)
     scale = torch.tensor(OBJECT_SCALE + (1.0,) * hand.joints)
     chain: list[Transform] = [
+        *([Curriculum(config.curriculum)] if explore else []),
         JointOffset(disturbances.joint_offset, half_range),
         SensorNoise(disturbances.sensor_noise),
         # the policy sees the two joint signals and nothing else; the first reading of an episode fills the whole stack
@@ -197,14 +207,6 @@ def transforms(config: EnvConfig, explore: bool) -> list[Transform]:
         size = (len(hand.fingers), hand.joints_per_finger)
         chain.append(FingerExploration(config.exploration, _demonstrated_gaits(config), *size))
     return chain
-
-
-def _placed_effects(effect: Effect | str, hand: Hand) -> list[Effect]:
-    """The effects that a text such as `backlash@q2: play=0.02` names, one for each joint that matches."""
-    if isinstance(effect, Effect):
-        return [effect]
-    name, values = parse_effect(effect)
-    return [kind(joint, **values) for kind, joint in resolve([name], hand.joint_names)]
 
 
 def _demonstrated_gaits(config: EnvConfig) -> torch.Tensor | None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.comparing.comparison import Comparison
 from tactile_cube.measurement.units import THOUSANDTHS, milli
-from tactile_cube.visualization.comparison_figures import marked
+from tactile_cube.visualization.charts import marked
 from tactile_cube.visualization.comparison_report import outcome
 from tactile_cube.visualization.rerun_recording import Branch, log_robot, recording_file, whole
 

@@ -2,10 +2,9 @@
 
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.measurement.comparing.comparison import AT_THE_FLOOR, Comparison
-from tactile_cube.measurement.comparing.noise_floor import NoiseFloor
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.units import MILLION, THOUSANDTHS, common_unit, milli, short
-from tactile_cube.visualization import comparison_figures as figures
+from tactile_cube.visualization import charts as figures
 from tactile_cube.visualization.report import Block, Figure, Listing, Report, Section, Table
 
 SUSPICIOUS = 300.0  # times the noise: more than effects usually leave
@@ -27,20 +26,26 @@ def summary(comparison: Comparison) -> str:
     """What the command line prints: the answer, one line a joint, where it fails."""
     errors, floor, raw = comparison.errors, comparison.floor, comparison.raw[0]
     unit = common_unit(comparison.recording.units.values())
-    rows = [
-        f"{joint:<16}{_numbers(error, floor.joints[joint], raw.joints[joint])}{_cell(comparison.fit[joint], 7, 1)} %"
-        for joint, error in errors.joints.items()
-    ]
+    table = [(joint, error, floor.joints[joint], raw.joints[joint]) for joint, error in errors.joints.items()]
+    rows = []
+    for joint, error, noise, plain in [*table, ("all", errors.overall, floor.overall, raw.overall)]:
+        cells = ((1e3 * error, 9, 3), (1e3 * noise, 9, 3), (error / noise, 15, 2), (1e3 * plain, 9, 3))
+        numbers = "".join(_cell(*cell) for cell in cells)
+        rows.append(f"{joint:<16}{numbers}" + (f"{_cell(comparison.fit[joint], 7, 1)} %" if joint != "all" else ""))
+    sources = {
+        "contact": "what a world with the true effects leaves of a grasp",
+        "repeats": f"scatter of {floor.repeats} repeats",
+        "guess": "sensor noise, a guess: no repeats",
+    }
     lines = [
         outcome(comparison),
         "",
         f"{'joint':<16}{'error':>9}{'floor':>9}  error / floor      raw      fit",
         *rows,
-        f"{'all':<16}{_numbers(errors.overall, floor.overall, raw.overall)}",
         f"RMS of free runs from the first state, {THOUSANDTHS[unit]}. error: the joint offsets of each initialisation "
         "removed; raw: nothing removed; fit: 100 % (1 - |raw error| / |motion|)",
         "",
-        f"noise floor: {_source(floor)}",
+        f"noise floor: {sources[floor.source]}",
     ]
     step = f"the simulator's own time step, {1e3 * comparison.step:g} ms,"
     for name, by_joint in (("sensor noise", floor.sensor), (step, floor.step_size)):
@@ -48,8 +53,9 @@ def summary(comparison: Comparison) -> str:
             size = (sum(value**2 for value in by_joint.values()) / len(by_joint)) ** 0.5
             lines.append(f"beside it: {name} {milli(size, unit)}")
     if (band := comparison.band) is not None:
-        share = f"{100 * band.inside:.0f} % of the samples"
-        lines.append(f"measured inside the band of {band.simulations} simulations: {share}")
+        lines.append(
+            f"measured inside the band of {band.simulations} simulations: {100 * band.inside:.0f} % of the samples"
+        )
     return "\n".join([*lines, "", *(f"- {sentence}" for sentence in comparison.sentences)])
 
 
@@ -59,6 +65,7 @@ def outcome(comparison: Comparison) -> str:
     head = (
         f"The simulated joints are {milli(comparison.errors.overall, unit)} (RMS) away from the measured ones; "
         f"{milli(comparison.floor.overall, unit)} would be noise alone."
+        + "".join(f" {one.sentence(unit)}." for one in comparison.floor.drift)
     )
     if comparison.diverged:
         return (
@@ -71,18 +78,8 @@ def outcome(comparison: Comparison) -> str:
     return f"{head} That is {short(comparison.ratio)} times the noise: {comparison.sentences[0]}.{check}"
 
 
-def _numbers(error: float, floor: float, raw: float) -> str:
-    return f"{_cell(1e3 * error, 9, 3)}{_cell(1e3 * floor, 9, 3)}{_cell(error / floor, 15, 2)}{_cell(1e3 * raw, 9, 3)}"
-
-
 def _cell(value: float, width: int, digits: int) -> str:
     return f"{value:>{width}.{digits}f}" if abs(value) < MILLION else f"{value:>{width}.2g}"
-
-
-def _source(floor: NoiseFloor) -> str:
-    if floor.source == "contact":
-        return "what a world with the true effects leaves of a grasp"
-    return f"scatter of {floor.repeats} repeats" if floor.source == "repeats" else "sensor noise, a guess: no repeats"
 
 
 def recording_section(recording: Recording, model: ModelFile | None) -> Section:
@@ -117,26 +114,19 @@ def error_section(comparison: Comparison) -> Section:
     floor, units = comparison.floor, comparison.recording.units
     rows = []
     for joint, error in comparison.errors.joints.items():
-        beside = [by_joint.get(joint) for by_joint in (floor.sensor, floor.step_size)]
-        rows.append(
-            (
-                joint,
-                milli(error, units[joint]),
-                milli(floor.joints[joint], units[joint]),
-                f"{error / floor.joints[joint]:.2f}",
-                *("" if one is None else milli(one, units[joint]) for one in beside),
-            )
-        )
+        known = (error, floor.joints[joint], floor.sensor.get(joint), floor.step_size.get(joint))
+        first, second, *beside = ["" if one is None else milli(one, units[joint]) for one in known]
+        rows.append((joint, first, second, f"{error / floor.joints[joint]:.2f}", *beside))
     unit = common_unit(units.values())
     overall = (milli(comparison.errors.overall, unit), milli(floor.overall, unit))
     rows.append(("all", *overall, f"{comparison.ratio:.2f}", "", ""))
-    text = [
+    text = (
         f"{FLOORS[floor.source]} A perfect model scores 1 in the column 'error / floor'. A model that scores 3 lacks "
         "something three times as large as the noise. The last two columns are the position sensor's own noise, and "
         "what the simulator's time step adds to any model's error."
-    ]
+    )
     header = ("joint", "error (RMS)", "noise floor", "error / floor", "sensor noise", "time step")
-    return Section("How well", text, [Table(header, rows)])
+    return Section("How well", [text], [Table(header, rows)])
 
 
 def where_section(comparison: Comparison, title: str = "Where it fails") -> Section:
@@ -192,34 +182,29 @@ def band_section(comparison: Comparison) -> list[Section]:
 
 def test_section(comparison: Comparison) -> Section:
     """What is left beside the noise floor, and, where it is more, what it goes with."""
-    floor = comparison.floor.joints
-    ratios = {joint: error / floor[joint] for joint, error in comparison.errors.joints.items()}
+    ratios = {joint: error / comparison.floor.joints[joint] for joint, error in comparison.errors.joints.items()}
     memory = {one.joint: f"{1e3 * one.correlation_time:.0f} ms" for one in comparison.whiteness}
     rows = [(joint, f"{ratio:.2f}", memory[joint]) for joint, ratio in ratios.items()]
-    table = Table(("joint", "left, in noise floors", "correlation time of the error"), rows)
+    blocks = [Table(("joint", "left, in noise floors", "correlation time of the error"), rows)]
     above = [joint for joint, ratio in ratios.items() if ratio > AT_THE_FLOOR]
-    if not above:
-        return Section(
-            "Is it noise?",
-            [
-                "Yes, as far as this recording can tell: no joint's error is above the noise floor. A free-running "
-                "simulation integrates every small error, so its error is correlated in time; a test of whiteness "
-                "says no more here."
-            ],
-            [table],
-        )
-    text = [
+    text = (
         f"Not at {', '.join(above)}: the error is above the noise floor. Noise follows no other signal; the error "
         "follows the signals below, which hint at its cause. 'By chance' is the probability of such a correlation "
         "between unrelated signals with the same autocorrelation."
-    ]
+        if above
+        else "Yes, as far as this recording can tell: no joint's error is above the noise floor. A free-running "
+        "simulation integrates every small error, so its error is correlated in time; a test of whiteness says no more "
+        "here."
+    )
     strongest = [
         (f"{c.joint} error", c.cause, f"{c.correlation:+.2f}", f"{1e3 * c.delay:.0f} ms", probability(c.p_value))
         for c in comparison.cross_correlations
         if c.joint in above
-    ][:MOST_CORRELATIONS]
-    header = ("", "follows", "correlation", "after", "by chance (p)")
-    return Section("Is it noise?", text, [table, *([Table(header, strongest)] if strongest else [])])
+    ]
+    if strongest:
+        header = ("", "follows", "correlation", "after", "by chance (p)")
+        blocks.append(Table(header, strongest[:MOST_CORRELATIONS]))
+    return Section("Is it noise?", [text], blocks)
 
 
 def method_section() -> Section:
@@ -274,14 +259,11 @@ def comparison_report(comparison: Comparison, command: str, model_path: str | No
 
 def _next_section(comparison: Comparison, model_path: str | None) -> Section:
     """What to type next."""
-    folder = comparison.recording.folder
     model = f" model={model_path}" if model_path else ""
     if comparison.at_the_floor:
-        said = (
-            "Nothing is missing at this noise. Check the same model on a recording of other motions, or train with it:"
-        )
+        said = "Nothing is missing at this noise. Check the model on a recording of other motions, or train with it:"
         command = f"python -m tactile_cube.train +experiment=adapt{model or ' model=MODEL.yaml'}"
     else:
         said = "Constants may be off, or an effect missing: diagnose refits the first, then searches for the second."
-        command = f"python -m tactile_cube.diagnose recording={folder}{model}"
+        command = f"python -m tactile_cube.diagnose recording={comparison.recording.folder}{model}"
     return Section("What to do next", [said], [Listing([command], code=True)])

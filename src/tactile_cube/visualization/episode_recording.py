@@ -22,7 +22,6 @@ from tactile_cube.visualization.rerun_recording import (
     Colours,
     episode_blueprint,
     log_robot,
-    pair_blueprint,
     recording_file,
 )
 from tactile_cube.visualization.scene import Part, object_parts
@@ -48,7 +47,7 @@ def write_episode(record: EpisodeRecord, path: Path, hand: Hand = DLR_HAND2, sum
         hand: the hand that acted.
         summary: Markdown shown beside the episode.
     """
-    with recording_file(path, episode_blueprint(record.fingers, hand.name)) as stream:
+    with recording_file(path, episode_blueprint(record.fingers, hand.name, {"": "Hand and cube"})) as stream:
         _log_episode(Branch(stream), record, hand, summary)
 
 
@@ -70,7 +69,7 @@ def write_pair(
     """
     names = {root: name for root, (_, name, _) in episodes.items()}
     fingers = next(iter(episodes.values()))[0].fingers
-    with recording_file(path, pair_blueprint(fingers, hand.name, names, curve is not None)) as stream:
+    with recording_file(path, episode_blueprint(fingers, hand.name, names, curve is not None)) as stream:
         for root, (record, _, described) in episodes.items():
             _log_episode(Branch(stream, f"{root}/"), record, hand, described)
         branch = Branch(stream)

@@ -12,7 +12,7 @@ from PIL import Image, ImageDraw
 
 from tactile_cube.evaluation.episode_record import EpisodeRecord
 from tactile_cube.evaluation.evaluation import Evaluation, VariantResult
-from tactile_cube.evaluation.touch import touching
+from tactile_cube.evaluation.verdict import touching
 from tactile_cube.hand import DLR_HAND2, Hand
 from tactile_cube.visualization.episode_recording import description, write_episode
 from tactile_cube.visualization.scene import BELOW, SIDE, Scene
@@ -54,13 +54,11 @@ def write_film(record: EpisodeRecord, path: Path, *, view: int = 256, hand: Hand
     samples = list(range(0, record.steps + 1, stride))
     frames = _frames(record, samples, view, hand)
     duration = STRIDE * float(record.time[1] - record.time[0])
-    for colours in (96, 48, 24):
-        film = _gif(frames, duration, colours)
+    for colours, part in ((96, 1.0), (48, 1.0), (24, 1.0), (24, 2 / 3)):
+        size = (int(part * frames[0].width), int(part * frames[0].height))
+        film = _gif([frame.resize(size) for frame in frames], duration, colours)
         if len(film) <= MAX_BYTES:
             break
-    else:
-        small = [frame.resize((frame.width * 2 // 3, frame.height * 2 // 3)) for frame in frames]
-        film = _gif(small, duration, 24)
     write_whole(path, film)
 
 

@@ -163,19 +163,14 @@ class Scene:
 
     def _visual(self, part: Part) -> int:
         look: dict[str, Any]
-        if part.kind == "box":
-            look = {"shapeType": pybullet.GEOM_BOX, "halfExtents": (part.size / 2).tolist()}
-        elif part.kind == "cylinder":
-            look = {"shapeType": pybullet.GEOM_CYLINDER, "radius": part.size[0] / 2, "length": part.size[2]}
-        elif part.kind == "sphere":
-            look = {"shapeType": pybullet.GEOM_SPHERE, "radius": part.size[0] / 2}
-        else:  # without normals none of it is drawn
-            look = {
-                "shapeType": pybullet.GEOM_MESH,
-                "vertices": part.size.reshape(-1, 3).tolist(),
-                "indices": list(range(3 * len(part.size))),
-                "normals": np.repeat(_normals(part.size), 3, axis=0).tolist(),
-            }
+        if part.kind == "mesh":  # without normals none of it is drawn
+            normals, corners = np.repeat(_normals(part.size), 3, axis=0).tolist(), part.size.reshape(-1, 3).tolist()
+            look = {"vertices": corners, "indices": list(range(len(corners))), "normals": normals}
+        else:
+            half, length = part.size / 2, part.size[2]
+            round_one = {"radius": half[0], "length": length} if part.kind == "cylinder" else {"radius": half[0]}
+            look = {"halfExtents": half.tolist()} if part.kind == "box" else round_one
+        look["shapeType"] = getattr(pybullet, f"GEOM_{part.kind.upper()}")
         return int(pybullet.createVisualShape(rgbaColor=[*part.colour, 1.0], physicsClientId=self._client, **look))
 
     def _load(self, hand: Hand) -> tuple[int, dict[int, int]]:

@@ -79,13 +79,13 @@ class TimeChart:
         self.others = _line(self.error, "other trials", FLOOR, "multi_line", alpha=0.5)
         self.measured = _line(self.angle, "measured", MEASURED, line_width=1.5)
         self.models = [
-            (
-                _line(self.angle, name, below, line_dash=dash, line_width=1.5),
-                _line(self.error, name, above, line_dash=dash, line_width=1.5),
-            )
-            for name, below, above, dash in (
-                ("other model", BEFORE, SIMULATED, "dashed"),
-                ("model", SIMULATED, ERROR, "solid"),
+            [
+                _line(made, name, color, line_dash=dash, line_width=1.5)
+                for made, color in ((self.angle, below), (self.error, above))
+            ]
+            for name, dash, below, above in (
+                ("other model", "dashed", BEFORE, SIMULATED),
+                ("model", "solid", SIMULATED, ERROR),
             )
         ]
         self.failing = models.ColumnDataSource({"x0": [], "x1": []})

@@ -141,8 +141,8 @@ class Desk:
     @property
     def same_rig(self) -> Recording | None:
         """The recording that is loaded, unless another rig's URDF was named since: what came back is added to it."""
-        same = self.bench is not None and self.bench.opened.rig.path == self.waiting.urdf
-        return self.bench.opened if self.bench is not None and same else None
+        bench = self.bench
+        return bench.opened if bench is not None and bench.opened.rig.path == self.waiting.urdf else None
 
     def import_waiting(self, typed: dict[str, str], columns: dict[str, Any], together: bool = False) -> None:
         """Import the logs that wait and load what they make; they wait on where something is wrong.

@@ -174,7 +174,9 @@ def _numbers(key: str, text: str) -> float | int | list[float] | list[int]:
     """One number, or one for each of several joints or files."""
     numbers = [number(key, part) for part in re.split(r"[\s,;]+", text.strip(" ,;[]\t\n"))]
     whole = [int(one) for one in numbers if one.is_integer()]
-    if key == "initialisation" and len(whole) == len(numbers):
+    if key == "initialisation":
+        if len(whole) < len(numbers):
+            raise InputError(f"{key}: '{text}': give a whole number for each file")
         return whole
     if key.endswith("_unit") and whole:
         return whole[0]

@@ -39,17 +39,11 @@ def signals(missing: Missing) -> list[str]:
 
 
 class Curve(NamedTuple):
-    """The mean of a missing torque over bins of a signal.
+    """The mean of a missing torque over bins of a signal; nan parts motion up from motion down."""
 
-    Attributes:
-        x: (bins,) mean of the signal in each; nan parts motion up from motion down.
-        mean: (bins,) [N m].
-        low: of its 95 % interval, segments being independent; `high` likewise.
-    """
-
-    x: Array
-    mean: Array
-    low: Array
+    x: Array  # (bins,) mean of the signal in each
+    mean: Array  # [N m]
+    low: Array  # of its 95 % interval, segments being independent
     high: Array
 
 

@@ -20,7 +20,7 @@ from tactile_cube.workbench.importing import LOGS, RIGS, number
 from tactile_cube.workbench.missing_torque import signals
 from tactile_cube.workbench.parameters import Value
 from tactile_cube.workbench.state import Look, Workbench
-from tactile_cube.workbench.tables import FOLDED, card, error_by_stage, error_of_trial, over_noise
+from tactile_cube.workbench.tables import FOLDED, card, error_by_stage, error_of_trial
 from tactile_cube.workbench.text import LABEL, Html, choose, html, listed, plain, show
 from tactile_cube.workbench.widgets import NONE, RED, YELLOW, button, column_of, field, row_of, select, text_of
 
@@ -276,7 +276,7 @@ class Page:
             masked = " without the intervals that it masked" if found.left_out else ""
             names = " and ".join(found.effects) or "no effect"
             answer = ANSWER.format(Html("\n").join(found.text.splitlines()))
-            said = [f"Error over noise with {names}: {over_noise(found.over_noise)}{masked}.", answer]
+            said = [f"Error over noise with {names}: {found.over_noise:.2f}{masked}.", answer]
         elif desk.running:
             said.append(listed([f"best so far: {desk.diagnosing.best}"]))
         show(self.progress, *said, FOLDED.format(f"{len(lines)} steps", listed(lines)))
@@ -326,7 +326,7 @@ class Page:
         names = {one.effect for one in unseen} | {look.name for look in self.looks}
         names |= {one.removesuffix(f"@{joint}") for one in bench.effects if one.endswith(f"@{joint}")}
         every = sorted(effect_path(effect) for effect in bench.search.effects)
-        choose(self.another, [NONE, *(name for name in every if name not in names)], NONE)
+        choose(self.another, [NONE, *(name for name in every if name not in names)])
         reach = self.desk.explainable.get(joint)
         bound = "" if reach is None else f" Any law of the logged signals: {100 * reach:.0f} % of the missing torque."
         show(
@@ -340,9 +340,7 @@ class Page:
         now, then, lines = bench.stage.over_noise, self.desk.promised, []
         if self.desk.chosen == f"{self.candidate}@{self.joint.value}":
             verdict = "would not get smaller" if then >= now else "would fall"
-            lines = [
-                f"error over noise {verdict}: {over_noise(now)} to {over_noise(then)}, before the rest is refitted"
-            ]
+            lines = [f"error over noise {verdict}: {now:.2f} to {then:.2f}, before the rest is refitted"]
         show(self.card, card(self.candidate, *lines) if self.candidate else "")
 
     def _slider(self, one: Value) -> models.Slider:

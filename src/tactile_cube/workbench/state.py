@@ -25,13 +25,12 @@ from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.identification import with_effect
 from tactile_cube.identification.model_files import UNITS, model_file
 from tactile_cube.identification.next_experiment import Experiment, next_experiment
-from tactile_cube.identification.search.candidates import Candidate
-from tactile_cube.identification.search.division import some
+from tactile_cube.identification.search.candidates import Candidate, Screen, screen
 from tactile_cube.identification.search.evidence import Judgement
 from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.search.proposals import LOOKED_AT, best_starts, stepped, wanted
 from tactile_cube.identification.search.residual_shape import Missing, black_box
-from tactile_cube.identification.search.screening import Screen, screen
+from tactile_cube.identification.search.search import some
 from tactile_cube.identification.verdict import Simulations
 from tactile_cube.measurement.bench import without_touches
 from tactile_cube.measurement.comparing.comparison import USUAL_STEP, Comparison, compare_recording, describe_comparison
@@ -90,22 +89,7 @@ class Look:
 
 
 class Workbench:
-    """A recording and a model that is compared with it, extended, and saved.
-
-    Attributes:
-        recording: as it is simulated: free motion, in steps as short as its sensors call for.
-        floor: its noise floor [rad].
-        search: the trials fitted and held out, with every effect compiled in.
-        untouched: the trials that nothing is fitted to and nothing chosen by; where there are too few, the held-out.
-        history: the stages after each change, the last one in force.
-
-    Example:
-        >>> bench = Workbench("my_recording")
-        >>> print([look.name for look in bench.candidates("q3")[0]])
-        >>> bench.add("stribeck_friction@q3")
-        >>> print([(stage.label, stage.over_noise) for stage in bench.stages])
-        >>> bench.save("outputs/my_model")
-    """
+    """A recording and a model that is compared with it, extended, and saved; docs/workbench.md has an example."""
 
     @as_input_errors
     def __init__(
@@ -127,14 +111,15 @@ class Workbench:
         effects = tuple(dict.fromkeys([*catalogue().values(), *(find_effect(name) for name in own_effects)]))
         say("dividing the trials")
         moving = in_time(without_touches(self.opened), effects, say, self.known)
+        # free motion, in steps as short as its sensors call for
         self.recording = in_steps(moving, effects, self.known, say)
         fitted, held_out = held_out_split(self.recording, seed=seed)
         fitted, tested = with_test_part(fitted, len(self.recording.trials), seed)
-        self.untouched = held_out if tested is None else tested
+        self.untouched = held_out if tested is None else tested  # what nothing is fitted to and nothing chosen by
         self.search = BoundedSearch(fitted, held_out, noise_with_links(self.recording), effects, say, self.known)
-        self.floor = noise_floor(self.recording)
+        self.floor = noise_floor(self.recording)  # [rad]
         self._looks: dict[str, Look] = {}
-        self.history: list[tuple[ModelStage, ...]] = []
+        self.history: list[tuple[ModelStage, ...]] = []  # the stages after each change, the last one in force
         self.base = self.search.base
         stated = self._stage(STATED, replace(self.base.fit, model=self.search.start), fitted=False)
         self._push((stated, self._stage(REFITTED, self.base.fit)))

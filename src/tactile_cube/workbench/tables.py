@@ -33,7 +33,7 @@ def error_by_stage(bench: Workbench) -> Html:
     for stage, note in zip(stages, ["", *(remark(*pair) for pair in pairwise(stages))], strict=True):
         color = ORANGE if note or stage.label == BY_HAND else BLUE
         bar = BAR.format(color, 100.0 * stage.over_noise / most)
-        number = NUMBER.format(over_noise(stage.over_noise))
+        number = NUMBER.format(f"{stage.over_noise:.2f}")
         rows.append(ROW.format(html(CELL.format(stage.label), number, bar, CELL.format(note))))
     names = ", ".join(trial.name for trial in bench.untouched.trials)
     return html(
@@ -41,11 +41,6 @@ def error_by_stage(bench: Workbench) -> Html:
         f"Error over sensor noise in short segments of {names}, which no model was fitted to; a perfect one has 1.",
         FOLDED.format("free runs of these trials, joint by joint", _free_runs(bench)),
     )
-
-
-def over_noise(value: float) -> str:
-    """Return the error over noise as it is shown everywhere."""
-    return f"{value:.2f}"
 
 
 def remark(before: ModelStage, after: ModelStage) -> str:

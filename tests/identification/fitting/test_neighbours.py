@@ -8,7 +8,7 @@ import pytest
 from tactile_cube.drivetrain.effects.catalogue import catalogue
 from tactile_cube.identification.fitting.shooting import Shooting
 from tactile_cube.identification.search.candidates import candidates
-from tactile_cube.identification.search.division import some
+from tactile_cube.identification.search.search import some
 from tactile_cube.measurement.comparing.noise_floor import noise_with_links
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.replay.nominal import nominal_model

@@ -10,8 +10,7 @@ import pytest
 from tactile_cube.drivetrain.effects import catalogue
 from tactile_cube.drivetrain.effects.command import CommandDelay
 from tactile_cube.drivetrain.effects.transmission import Backlash
-from tactile_cube.identification.fitting.initial_states import with_initial_states
-from tactile_cube.identification.fitting.problem import Problem
+from tactile_cube.identification.fitting.problem import Problem, with_initial_states
 from tactile_cube.identification.fitting.shooting import Shooting
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording

@@ -11,11 +11,13 @@ from tactile_cube.drivetrain.effects import catalogue, find_effect
 from tactile_cube.drivetrain.effects.scales import FINGER, Scales
 from tactile_cube.identification.search.candidates import (
     Candidate,
+    Score,
     candidates,
     forms,
+    resized,
+    start,
     with_details,
 )
-from tactile_cube.identification.search.screening import Score, resized, start
 from tactile_cube.measurement.joint_scales import joint_scales
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording

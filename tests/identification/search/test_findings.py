@@ -5,9 +5,10 @@ from pathlib import Path
 import numpy as np
 
 from tactile_cube.drivetrain.effects import find_effect
+from tactile_cube.identification.criteria import Criteria
 from tactile_cube.identification.search.explanation import named_by
 from tactile_cube.identification.search.findings import find
-from tactile_cube.identification.search.search import Search
+from tactile_cube.identification.search.search import BestSoFar, Search
 from tactile_cube.identification.verdict import decide
 from tactile_cube.measurement.split import held_out_split
 from tests.identification.rigs_of_any_size import NOISE, Size, simulated
@@ -36,3 +37,19 @@ def test_a_mass_that_a_torque_constant_imitates_exactly_is_named_with_it(tmp_pat
     named = {name for one in (verdict.chosen, *verdict.rivals) for name, _ in named_by(one.effects)}
     assert verdict.kind == "ambiguous"
     assert named == {"payload", "torque_gain"}
+
+
+def test_a_search_that_may_simulate_little_ends_early_and_says_what_it_has_and_what_was_next(tmp_path: Path) -> None:
+    effects = tuple(find_effect(name) for name in ("payload", "torque_gain", "command_delay"))
+    recording = simulated(tmp_path, Size(slides=True), effects[0], {"mass": 0.1, "distance": 0.03})
+    lines = list[str]()
+    said = BestSoFar(lines.append)
+    said.due = 0.0  # as if ten seconds had gone by
+    criteria = Criteria(most_simulated=1.0)
+    findings = find(Search(*held_out_split(recording), np.full(1, NOISE), effects, said, criteria=criteria))
+    assert findings.judged == ()
+    assert findings.stopped == "every law by itself"
+    said("anything")
+    assert lines[-1].startswith("best answer so far: constants refitted (")
+    assert lines[-1].endswith("; next: every law by itself")
+    assert not find(Search(*held_out_split(recording), np.full(1, NOISE), effects, lambda line: None)).stopped

@@ -7,7 +7,7 @@ import pytest
 from tactile_cube.drivetrain.effects import catalogue
 from tactile_cube.drivetrain.effects.scales import FINGER
 from tactile_cube.identification.search.explanation import Explanation
-from tactile_cube.identification.search.shared_offset import common_offsets, shared_offset
+from tactile_cube.identification.search.findings import common_offsets, shared_offset
 from tactile_cube.measurement.replay.model import Model
 from tests.identification.test_verdict import FIT, judged
 

@@ -9,7 +9,13 @@ Log = dict[str, np.ndarray]
 
 
 def played(
-    robot: str, mode: str = "position", hangs_at: float = 0.0, friction: float = 0.0, seed: int = 0, noise: float = 1e-4
+    robot: str,
+    mode: str = "position",
+    hangs_at: float = 0.0,
+    friction: float = 0.0,
+    seed: int = 0,
+    noise: float = 1e-4,
+    gains: tuple[float, float] = (KP, KD),
 ) -> Log:
     """Six seconds at 200 Hz, by semi-implicit Euler in 0.25 ms; a reading follows its command's period."""
     rng = np.random.default_rng(seed)
@@ -20,7 +26,7 @@ def played(
     q, v, step, positions = (1.0 if mode == "free" else goal[0]), 0.0, 2.5e-4, []
     for command in goal:
         for _ in range(20):
-            drive = {"position": KP * (command - q) - KD * v, "torque": command}.get(mode, 0.0)
+            drive = {"position": gains[0] * (command - q) - gains[1] * v, "torque": command}.get(mode, 0.0)
             pull = drive - WEIGHT * np.sin(q - hangs_at) * (robot == "pendulum") - 0.02 * v * (mode != "position")
             free = v + step * pull / INERTIA
             v = np.sign(free) * max(abs(free) - step * friction / INERTIA, 0.0)

@@ -216,7 +216,7 @@ def change_goal(frame: Frame) -> Frame:
         (
             {"controller": {"mode": "current"}},
             dict,
-            r"mode=current: unknown; choose one of position, torque, voltage, free",
+            "source.controller.mode=current: expected 'position', 'torque', 'voltage' or 'free'",
         ),
         ({}, change_goal, "'goal1' and 'soll_goal1' could both be the command of 'a'"),
         ({}, lambda frame: {k.rstrip("12"): v for k, v in frame.items() if "2" not in k}, "of which joint"),

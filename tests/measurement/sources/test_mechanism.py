@@ -12,7 +12,7 @@ from tactile_cube.identification.identification import divided
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.writing import write_recordings
-from tactile_cube.measurement.sources.servo import read_servo, servos
+from tactile_cube.measurement.sources.mechanism import read_servo, servos
 from tactile_cube.measurement.sources.source import recording_tables, source_settings
 from tests.measurement.sources.bare_joint import INERTIA, KD, KP, LEVER, MASS, WEIGHT, played
 
@@ -100,7 +100,7 @@ def test_guesses_a_third_off_are_fitted_back_to_the_noise(tmp_path: Path) -> Non
     urdf.write_text(urdf.read_text().replace(f'mass value="{mass:.9g}"', f'mass value="{0.7 * mass:.9g}"'))
     search, _ = divided(read_recording(tmp_path / "out"), (), 0, lambda line: None)
     assert [term.label for term in search.start.terms] == ["payload@pendulum"]
-    base = search.fit_base()
+    base = search.base
     assert base.judgement.error < 1.2
     assert 0.7 * mass + base.fit.model.terms[0].values["mass"] == pytest.approx(mass, rel=0.1)
 
@@ -111,7 +111,17 @@ def test_guesses_a_third_off_are_fitted_back_to_the_noise(tmp_path: Path) -> Non
         ({}, "either source.urdf=... .* or, for one joint without one, source.robot=pendulum|wheel|slide"),
         ({"robot": "pendulum", "urdf": "a.urdf"}, "either source.urdf"),
         ({"robot": "pendulm"}, "source.robot=pendulm: unknown; choose one of pendulum, wheel, slide"),
-        ({"robot": "wheel", "mass": -1.0}, "source.mass=-1: give a finite number above 0"),
+        ({"robot": "wheel", "mass": -1.0}, "source.mass=-1.0: expected greater than 0"),
+        ({"robot": "wheel", "gain": 16}, "source.gain=16: is that of source.servo=NAME, which is not given"),
+        ({"robot": "wheel", "rate": "fast"}, "source.rate=fast: expected a valid number"),
+        ({"robot": "wheel", "gravity": 9.81}, "source.gravity=9.81: expected a valid tuple"),
+        ({"robot": "wheel", "read": "behind"}, "source.read=behind: expected 'before' or 'after'"),
+        ({"robot": "wheel", "controller": {"kp": "abc"}}, "source.controller.kp=abc: expected a valid number"),
+        ({"robot": "wheel", "length": -1}, "source.length=-1: expected greater than 0"),
+        (
+            {"robot": "wheel", "angle_unit": "degrees"},
+            "unknown; choose one of rad, deg, turn, mrad, range .* or the ticks",
+        ),
         ({"robot": "wheel", "servo": "sts3251"}, "source.servo=sts3251: unknown.*did you mean sts3215"),
     ],
 )

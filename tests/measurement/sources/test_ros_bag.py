@@ -8,7 +8,7 @@ from tactile_cube import limits
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.writing import write_recording
-from tactile_cube.measurement.sources.ros_bag import RosBag
+from tactile_cube.measurement.sources.ros_bag import RosBag, unpacked
 from tactile_cube.measurement.sources.source import source_settings
 from tests.measurement.small_rig import URDF, table
 from tests.measurement.sources.small_bag import write_bag
@@ -16,8 +16,6 @@ from tests.measurement.sources.small_bag import write_bag
 pytest.importorskip("mcap_ros2.writer", reason="needs the extra `ros`")
 import lz4.frame
 import zstandard
-
-from tactile_cube.measurement.sources.mcap_file import unpacked
 
 
 @pytest.fixture(params=["ZSTD", "LZ4", "NONE"])

@@ -268,7 +268,10 @@ def test_gains_that_nobody_states_begin_where_the_log_has_them(tmp_path: Path) -
     assert recording.description.unknown == ["kp", "kd", "reflected_inertia"]
     assert recording.gains.kp[0] == pytest.approx(4.0, rel=0.15)
     assert recording.stated("kp", "a") is None
-    assert any("kp is not stated" in line for line in recording.warnings)
+    assert any(
+        "not stated, so unknown and to be identified, beginning with guesses: kp from" in line
+        for line in recording.warnings
+    )
 
 
 @pytest.mark.parametrize(("factor", "doubted"), [(1.0, False), (3.0, False), (57.3, True), (1 / 57.3, True)])

@@ -17,6 +17,7 @@ from tactile_cube.errors import InputError
 
 Array = npt.NDArray[np.float64]
 View = Callable[[str], Array]
+Simpler = Mapping[str, Mapping[str, float]]
 
 
 class Stage(Enum):
@@ -127,7 +128,11 @@ class Effect:
     Empty: one form, all parameters at their typical values.
     """
     details: ClassVar[tuple[str, ...]] = ()  # parameters that a search frees last, where a form fits the data already
-    contains: ClassVar[tuple[str, ...]] = ()  # names of simpler effects that are special cases of this one
+    contains: ClassVar[Simpler] = {}
+    """Simpler effects that are special cases of this one, and the parameters' values at which it becomes each of them.
+
+    Each value alone suffices; an infinite one is the parameter's largest. Empty where no single value does it.
+    """
     state_size: ClassVar[Any] = 0
     """How many numbers the law keeps between steps, zero after a reset; a class method of the step [s] if it counts."""
     bounded_memory: ClassVar[bool] = False

@@ -1,9 +1,10 @@
 """Rotor and link as two masses with a spring between them."""
 
 from math import pi
+from typing import ClassVar
 
 from tactile_cube.compiled import compiled
-from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Simpler, Stage
 from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.drivetrain.signals import (
     ACCELERATION,
@@ -57,7 +58,7 @@ class ElasticJoint(Effect):
 
     name = "elastic_joint"
     stage = Stage.VELOCITY_SENSOR
-    contains = ("elasticity",)
+    contains: ClassVar[Simpler] = {"elasticity": {"rotor": 0.0}}
     parameters = (
         Parameter("compliance", "rad/(N m)", 0.0, 0.0, 1.0, 0.05, "5-50 N m/rad"),
         Parameter("rotor", "kg m^2", 0.0, 0.0, 0.0049, 0.0025, "gears are chosen for a rotor like the load"),

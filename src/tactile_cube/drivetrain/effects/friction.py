@@ -1,8 +1,11 @@
 """Dry friction of a joint."""
 
-from math import exp
+from dataclasses import replace
+from math import exp, inf
+from typing import ClassVar
 
-from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Simpler, Stage
+from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.drivetrain.signals import DAMPING, DIRECTION, FRICTION, JOINT_TORQUE, TIME, TORQUE, VELOCITY
 
 
@@ -37,7 +40,7 @@ class StribeckFriction(Effect):
 
     name = "stribeck_friction"
     stage = Stage.FRICTION
-    contains = ("coulomb_friction",)
+    contains: ClassVar[Simpler] = {"coulomb_friction": {"velocity": inf}}
     parameters = (
         Parameter("excess", "N m", 0.0, 0.0, 0.5, 0.04, "+10-50 % of the Coulomb friction"),
         Parameter("velocity", "rad/s", 0.15, 0.01, 3.0, 0.15, "0.05-0.3 rad/s"),
@@ -87,7 +90,7 @@ class AsymmetricFriction(Effect):
 
     name = "asymmetric_friction"
     stage = Stage.FRICTION
-    contains = ("coulomb_friction",)
+    contains: ClassVar[Simpler] = {"coulomb_friction": {"difference": 0.0, "ratio": 0.0}}
     parameters = (
         Parameter("difference", "N m", 0.0, -0.3, 0.3, 0.02, "5-30 % of the dry friction; more with worn gears"),
         Parameter("ratio", unit="1", neutral=0.0, low=-0.9, high=0.9, typical=0.0, source="5-30 %"),
@@ -103,9 +106,10 @@ class AsymmetricFriction(Effect):
 class FrictionDrift(Effect):
     """Dry friction that changes while the joint warms up.
 
-    F += friction + change * (1 - exp(-t / time_constant)), t from the start of the trial. The longest time constant
-    stands for a change proportional to time. Trials of seconds cannot separate the two numbers then: only change /
-    time_constant counts, and `change` may be far larger than any change in the recording.
+    F += friction + change * (1 - exp(-t / time_constant)), t from the start of the robot's initialisation where time
+    stamps go on from trial to trial, else of each trial. The longest time constant stands for a change proportional to
+    time. Short recordings cannot separate the two numbers then: only change / time_constant counts, and `change` may be
+    far larger than any change in the recording.
 
     In data: a trend over time in the same repeated motion.
     Confused with: `coulomb_friction` in a single short trial.
@@ -114,7 +118,7 @@ class FrictionDrift(Effect):
 
     name = "friction_drift"
     stage = Stage.FRICTION
-    contains = ("coulomb_friction",)
+    contains: ClassVar[Simpler] = {"coulomb_friction": {"change": 0.0}}
     parameters = (
         Parameter("change", unit="N m", neutral=0.0, low=-5.0, high=5.0, typical=0.02, source="-20 to -50 % over 20 K"),
         Parameter("time_constant", "s", 200.0, 0.5, 200.0, 5.0, "seconds (lubricant) to minutes (housing)"),
@@ -123,6 +127,20 @@ class FrictionDrift(Effect):
 
     forms = ({"change": 0.02, "time_constant": 5.0}, {"change": -0.02, "time_constant": 5.0, "friction": 0.04})
     details = ("friction",)
+
+    @classmethod
+    def parameters_at(cls, scales: Scales) -> dict[str, Parameter]:
+        """Return the parameters; a time constant may be as long as the recording."""
+        known = super().parameters_at(scales)
+        slowest = max(known["time_constant"].high, scales.lasts)
+        return known | {"time_constant": replace(known["time_constant"], high=slowest, neutral=slowest)}
+
+    @classmethod
+    def starts_at(cls, scales: Scales) -> list[dict[str, float]]:
+        """Return the forms, and the same as slow as a recording is long that goes on over several trials."""
+        known = super().starts_at(scales)
+        slow = scales.lasts / 3.0
+        return known + [{**form, "time_constant": slow} for form in known if slow > 2.0 * form["time_constant"]]
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
@@ -147,7 +165,7 @@ class PreslidingFriction(Effect):
 
     name = "presliding_friction"
     stage = Stage.FRICTION
-    contains = ("coulomb_friction",)
+    contains: ClassVar[Simpler] = {"coulomb_friction": {"breakaway": 0.0}}
     parameters = (
         Parameter("breakaway", unit="rad", neutral=0.0, low=0.0, high=0.1, typical=0.003, source="0.05 mrad to 1 deg"),
         Parameter("excess", "N m", 0.0, -0.05, 0.5, 0.0, "friction beyond the nominal static friction"),

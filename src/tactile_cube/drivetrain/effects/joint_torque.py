@@ -1,8 +1,9 @@
 """Torques on the joint that depend smoothly on its motion."""
 
 from math import isfinite, tanh
+from typing import ClassVar
 
-from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Simpler, Stage
 from tactile_cube.drivetrain.effects.scales import Scales, unit_at
 from tactile_cube.drivetrain.signals import ANGLE, DAMPING, JOINT_TORQUE, POSITION, VELOCITY
 
@@ -86,7 +87,7 @@ class PositionTorque(Effect):
 
     name = "position_torque"
     stage = Stage.JOINT_TORQUE
-    contains = ("torque_bias", "cogging", "joint_stop")
+    contains: ClassVar[Simpler] = {"torque_bias": {"stiffness": 0.0}, "cogging": {}, "joint_stop": {}}
     parameters = (
         Parameter("stiffness", unit="N m/rad", neutral=0.0, low=-3.0, high=3.0, typical=0.05, source=SOURCE),
         Parameter("bias", unit="N m", neutral=0.0, low=-1.0, high=1.0, typical=0.0, source=SOURCE),

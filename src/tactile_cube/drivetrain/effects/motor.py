@@ -1,11 +1,12 @@
 """What the motor makes of the torque that its controller asks for."""
 
 from collections.abc import Mapping
-from math import cos, exp, isfinite, pi, sin
+from math import cos, exp, inf, isfinite, pi, sin
+from typing import ClassVar
 
 import numpy as np
 
-from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage, harmonic
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Simpler, Stage, harmonic
 from tactile_cube.drivetrain.effects.scales import Scales, unit_at
 from tactile_cube.drivetrain.signals import ACCELERATION, ANGLE, DAMPING, JOINT_TORQUE, TORQUE, VELOCITY
 
@@ -49,7 +50,7 @@ class TorqueCurve(Effect):
 
     name = "torque_curve"
     stage = Stage.MOTOR_TORQUE
-    contains = ("torque_gain",)
+    contains: ClassVar[Simpler] = {"torque_gain": {"bend": 0.0}}
     parameters = (
         Parameter("bend", unit="1", neutral=0.0, low=-0.8, high=1.5, typical=-0.2, source="duty laws: -0.1 to -0.5"),
         Parameter("gain", unit="1", neutral=0.0, low=-0.8, high=1.0, typical=0.0, source="1-15 %"),
@@ -297,7 +298,7 @@ class BackEmf(Effect):
 
     name = "back_emf"
     stage = Stage.MOTOR_TORQUE
-    contains = ("torque_saturation",)
+    contains: ClassVar[Simpler] = {"torque_saturation": {"no_load": inf}}
     parameters = (
         Parameter("stall", "N m", UNLIMITED, 0.005, UNLIMITED, 0.2, "data sheet", scale=0.02),
         Parameter("no_load", "rad/s", 10.0, 0.5, 1e3, 5.0, "data sheet"),

@@ -32,6 +32,7 @@ class Scales:
         torque_limit: stated limit of the controller [N m]; infinite without one.
         lower: stated lower end of the joint [rad]; infinite without one.
         upper: stated upper end [rad].
+        lasts: time from the start of an initialisation to the end of its last trial [s].
     """
 
     torque: float
@@ -52,6 +53,7 @@ class Scales:
     torque_limit: float = inf
     lower: float = -inf
     upper: float = inf
+    lasts: float = 0.0
 
     @property
     def span(self) -> float:

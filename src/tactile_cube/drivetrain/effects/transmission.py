@@ -1,12 +1,13 @@
 """Between motor and link, and what the sensors there report."""
 
 from collections.abc import Mapping
-from math import asinh, cos, exp, sin, sinh, sqrt, tanh
+from math import asinh, cos, exp, inf, sin, sinh, sqrt, tanh
+from typing import ClassVar
 
 import numpy as np
 
 from tactile_cube.compiled import compiled
-from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Place, Stage, View, harmonic
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Place, Simpler, Stage, View, harmonic
 from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.drivetrain.signals import (
     ACCELERATION,
@@ -124,7 +125,7 @@ class StiffeningElasticity(Effect):
 
     name = "stiffening_elasticity"
     stage = Stage.DEFLECTION
-    contains = ("elasticity",)
+    contains: ClassVar[Simpler] = {"elasticity": {"cubic": 0.0}}
     parameters = (
         Parameter("compliance", "rad/(N m)", 0.0, 0.0, 2.0, 0.1, "slack tendons: 2-20 N m/rad"),
         Parameter("cubic", "N m/rad^3", 0.0, 0.0, 10000000.0, 2000.0, "as large as the linear part at 10-50 mrad"),
@@ -243,7 +244,7 @@ class Backlash(Effect):
 
     name = "backlash"
     stage = Stage.POSITION_SENSOR
-    contains = ("elasticity",)
+    contains: ClassVar[Simpler] = {"elasticity": {"softness": inf}}
     parameters = (
         Parameter("play", unit="rad", neutral=0.0, low=0.0, high=0.15, typical=0.01, source="0.1-1 deg"),
         Parameter("gap", unit="rad", neutral=0.0, low=0.0, high=0.15, typical=0.0, source="0.1-1 deg"),

@@ -28,8 +28,8 @@ from tactile_cube.identification.fitting.intervals import NORMAL_95, Fitted, bou
 from tactile_cube.identification.model_files import effect_estimate
 from tactile_cube.identification.search.candidates import Candidate, model_unknowns, without_effect
 from tactile_cube.identification.search.evidence import gain, p_value, worse
-from tactile_cube.identification.search.explanation import Explanation, Proposal, named_by, proven
-from tactile_cube.identification.search.findings import Findings, arranged
+from tactile_cube.identification.search.explanation import Explanation, Proposal, named_by
+from tactile_cube.identification.search.findings import Findings
 from tactile_cube.identification.search.proposals import CLOSE
 from tactile_cube.identification.verdict import Kind, Verdict, decide, unexplained_joints
 from tactile_cube.measurement.bench import with_object
@@ -215,11 +215,9 @@ class ContactSearch:
         self.base = Explanation((), start, self.validation.judged(grasps.start), 1.0, 0.0)
 
     def find(self) -> Findings:
-        """Everything that was tried."""
-        tried = self.proposed()
-        judged = [self.explained(one) for one in tried]
-        good = [one for one in judged if proven(one, self.criteria)]
-        return arranged(self.base, self.base.judgement, judged, good, (), self.criteria)
+        """Everything that was tried, all laws of the catalogue counted."""
+        judged = tuple(self.explained(one) for one in self.proposed())
+        return Findings(self.base, self.base.judgement, judged, looked=len(contact_catalogue()))
 
     def proposed(self) -> list[Proposal]:
         """Sets by their fit alone."""
@@ -258,7 +256,7 @@ class ContactSearch:
         return one
 
     def explained(self, one: Proposal) -> Explanation:
-        """A fitted set on the held-out trials, all laws of the catalogue counted."""
+        """A fitted set on the held-out trials."""
         judged = self.validation.judged(one.fit.model)
         chance = min(1.0, p_value(self.base.judgement, judged) * len(contact_catalogue()))
         return Explanation(one.effects, one.fit, judged, chance, gain(self.base.judgement, judged))
@@ -273,12 +271,14 @@ class ContactDiagnosis(ContactIdentification):
         findings: what was tried.
         rivals: what explains the grasps as well, with intervals.
         unexplained: joints of which more is left than is tolerated.
+        criteria: what decided.
     """
 
     answer: Verdict
     findings: Findings
     rivals: tuple[tuple[Explanation, Fitted], ...]
     unexplained: list[str]
+    criteria: Criteria
 
     @property
     def verdict(self) -> Kind:
@@ -294,7 +294,7 @@ class ContactDiagnosis(ContactIdentification):
             "effects": [] if unknown else entries,
             "sets": [names_of(one) for one, _ in explanations] if self.rivals else [],
             "unexplained_joints": self.unexplained,
-            "ranking": ranking(self.findings),
+            "ranking": ranking(self.findings, self.criteria),
             # grasps refit no constants of the drives: the stated error stands for the refitted one
             "error": self.errors | {"refitted": self.errors["nominal"]},
             "error_joints": self.joint_errors,
@@ -331,7 +331,7 @@ def diagnosed(grasps: OpenGrasps, joints: Sequence[str], criteria: Criteria, say
     errors = {key: search.validation.errors(one, joints) for key, one in stages.items()}
     held_out = [one.trial.name for one in search.validation.grasps]
     left = unexplained_joints(answer.chosen, (*joints, "joint offsets"), criteria)
-    return ContactDiagnosis(fitted, errors, grasps.noise_floor, held_out, answer, findings, rivals, left)
+    return ContactDiagnosis(fitted, errors, grasps.noise_floor, held_out, answer, findings, rivals, left, criteria)
 
 
 def with_contact(result: Mapping[str, Any], found: ContactDiagnosis) -> dict[str, Any]:

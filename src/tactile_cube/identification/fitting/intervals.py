@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit, precision
 from tactile_cube.identification.fitting.problem import Problem
-from tactile_cube.identification.fitting.time_step import step_shift
+from tactile_cube.identification.fitting.resolution import step_shift
 from tactile_cube.identification.fitting.unknowns import Unknown, read_all
 from tactile_cube.measurement.replay.model import Model
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects.effect import Effect
+from tactile_cube.errors import InputError
 from tactile_cube.measurement.joint_scales import joint_scales
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
@@ -29,7 +30,12 @@ class Shooting(Simulator):
         Args:
             recording: rig, controller and sampling step.
             effects: classes that a model may use, beside those of the catalogue.
+
+        Raises:
+            InputError: no joint moves.
         """
+        if not any(np.ptp(trial.position, axis=0).any() for trial in recording.trials):
+            raise InputError(f"{recording.folder}: no joint moves in any trial; record motion, or check the columns")
         self.scales = joint_scales(recording)
         self.sizes = dict(zip(recording.joints, self.scales, strict=True))
         time = self.scales[0].time

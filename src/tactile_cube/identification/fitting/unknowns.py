@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_cube.drivetrain.effects.effect import Effect
+from tactile_cube.drivetrain.effects.scales import Scales
+from tactile_cube.measurement.comparing.error import LARGEST_OFFSET
+from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model
 
 Array = NDArray[np.float64]
@@ -80,3 +84,86 @@ def put_all(model: Model, unknowns: tuple[Unknown, ...], values: Array) -> Model
 def read_all(model: Model, unknowns: tuple[Unknown, ...]) -> Array:
     """Values (P,) of the unknowns in a model."""
     return np.array([unknown.of(model) for unknown in unknowns])
+
+
+TOLERANCE = {
+    "kd": (0.75, 1.3),
+    "static_friction": (0.5, 1.6),
+    "reflected_inertia": (0.6, 1.6),
+    "stiffness": (0.8, 1.25),
+}
+"""Part of the nominal value at which a constant still counts as the nominal one; more is an effect that is missing."""
+MEASURED, UNKNOWN = (0.2, 5.0), (0.02, 50.0)
+SPREAD = 0.12  # relative standard deviation of a true constant about its nominal value
+OFFSET, OFFSET_SPREAD = 0.05, 0.01  # [rad] of a finger
+READING_SPREAD = 0.3  # rows: as if a reading came at any time within half a row of its stamp
+CREEP, CREEP_SPREAD, LARGEST_CREEP = 0.05, 0.1, 1.0  # [rad/s per N m] where friction is regularised
+
+
+def every_effect(effects: Sequence[type[Effect]], start: Model) -> tuple[type[Effect], ...]:
+    """The classes to compile: those to try, and those of the model to begin with."""
+    return tuple(dict.fromkeys([*effects, *(term.effect for term in start.terms)]))
+
+
+def tolerance(recording: Recording) -> dict[str, tuple[float, float]]:
+    """Bounds relative to the nominal values; wide for what a bench trial of the recording measures directly.
+
+    Source: Sievers et al., ICRA 2022, II-D: K_P from a known force on a static finger, K_e from clamped links.
+    """
+    wide = {}
+    if any(trial.force is not None for trial in recording.trials):
+        wide["kp"] = MEASURED
+    if any(trial.clamped for trial in recording.trials):
+        wide["stiffness"] = MEASURED
+    unknown = [key for key in recording.description.unknown if key != "mass"]  # which is an effect's
+    return TOLERANCE | wide | dict.fromkeys(unknown, UNKNOWN)
+
+
+def base_unknowns(
+    recording: Recording, nominal: Mapping[str, Array], sizes: Mapping[str, Scales]
+) -> tuple[Unknown, ...]:
+    """Constants that a refit may change, about their `nominal` values, and the joint offsets of each initialisation."""
+    joints = range(len(recording.joints))
+    constants = [
+        _around_nominal(key, j, float(nominal[key][j]), low, high, key in recording.description.unknown)
+        for key, (low, high) in tolerance(recording).items()
+        for j in joints
+        if 0.0 < nominal[key][j] < np.inf
+    ]
+    creeps = [
+        _creep(j, sizes[joint].of("rad/s") / sizes[joint].of("N m"))
+        for j, joint in enumerate(recording.joints)
+        if nominal["static_friction"][j] > 0.0
+    ]
+    delays = [_reading_delay(j, recording.step) for j in joints]
+    return (*constants, *creeps, *delays, *offset_unknowns(recording, sizes))
+
+
+def offset_unknowns(recording: Recording, sizes: Mapping[str, Scales]) -> tuple[Unknown, ...]:
+    """The joint offsets of each initialisation of a recording."""
+    initialisations = sorted({trial.initialisation for trial in recording.trials})
+    return tuple(
+        _offset(j, initialisation, sizes[joint].of("rad"))
+        for initialisation in initialisations
+        for j, joint in enumerate(recording.joints)
+    )
+
+
+def _offset(joint: int, initialisation: int, size: float) -> Unknown:
+    most, scale, spread = size * LARGEST_OFFSET, size * OFFSET, size * OFFSET_SPREAD
+    return Unknown("offset", "offset", joint, -most, most, scale, initialisation, spread=spread)
+
+
+def _creep(joint: int, size: float) -> Unknown:
+    most, scale, spread = size * LARGEST_CREEP, size * CREEP, size * CREEP_SPREAD
+    return Unknown("constant", "friction_creep", joint, 0.0, most, scale, spread=spread)
+
+
+def _reading_delay(joint: int, row: float) -> Unknown:
+    """When within a row the position is read is never exact, and what is a row late is a delay."""
+    return Unknown("constant", "reading_delay", joint, -row, row, 0.1 * row, spread=READING_SPREAD * row)
+
+
+def _around_nominal(key: str, joint: int, nominal: float, low: float, high: float, unknown: bool) -> Unknown:
+    spread = (high if unknown else SPREAD) * nominal
+    return Unknown("constant", key, joint, nominal * low, nominal * high, 0.2 * nominal, centre=nominal, spread=spread)

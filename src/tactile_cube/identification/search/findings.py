@@ -3,9 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from tactile_cube.identification.criteria import Criteria
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student_t
+
+from tactile_cube.drivetrain.effects.effect import Effect
+from tactile_cube.identification.criteria import STANDARD, Criteria
+from tactile_cube.identification.fitting.intervals import NORMAL_95, standard_errors
+from tactile_cube.identification.search.candidates import Candidate, Score, Sizes, first_term
 from tactile_cube.identification.search.evidence import Judgement, worse
 from tactile_cube.identification.search.explanation import (
     Explanation,
@@ -28,9 +35,9 @@ from tactile_cube.identification.search.proposals import (
     refitted,
     without,
 )
-from tactile_cube.identification.search.screening import Score
 from tactile_cube.identification.search.search import Search
-from tactile_cube.identification.search.shared_offset import shared_offset
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.replay.model import Model, Term
 
 MOST = 4  # effects in a set
 JUDGED = 6  # sets that the held-out trials judge, and as many more of what may stand for one of the chosen effects
@@ -43,20 +50,35 @@ class Findings:
     Attributes:
         base: the refitted base model.
         nominal: the model before any fit, judged on the held-out trials.
-        levels: explanations that earn their place by number of effects, best first.
+        judged: sets that the held-out trials judged.
         scores: the first look at every law, best first.
-        unproven: what would explain much and may be chance, best first.
-        surpassed: what was judged and is clearly worse than the best.
-        unclear: what was judged and does not earn its place: to predict with where nothing is claimed.
+        looked: laws at joints that were looked at, each of which may seem best by chance.
+        stopped: what was left to try as the search ran out of simulations; empty where it ended by itself.
     """
 
     base: Explanation
     nominal: Judgement
-    levels: tuple[tuple[Explanation, ...], ...]
-    scores: tuple[Score, ...]
-    unproven: tuple[Explanation, ...] = ()
-    surpassed: tuple[Explanation, ...] = ()
-    unclear: tuple[Explanation, ...] = ()
+    judged: tuple[Explanation, ...] = ()
+    scores: tuple[Score, ...] = ()
+    looked: int = 1
+    stopped: str = ""
+
+    def proven(self, criteria: Criteria = STANDARD) -> list[Explanation]:
+        """Sets that are no chance, best first; none beside a base model at the floor but a shared offset."""
+        found = [one for one in self.judged if proven(one, criteria)]
+        if self.base.largest_error <= criteria.floor:
+            found = [one for one in found if one.judgement is self.base.judgement]
+        return sorted(found, key=lambda one: one.judgement.costs.sum())
+
+    def kept(self, criteria: Criteria = STANDARD) -> list[Explanation]:
+        """Those of them that are not clearly worse than the best."""
+        found = self.proven(criteria)
+        return [one for one in found if not worse(one.judgement, found[0].judgement, criteria)]
+
+    def unproven(self, criteria: Criteria = STANDARD) -> list[Explanation]:
+        """What would explain much and may be chance, best first; nothing beside what is proven."""
+        doubtful = [] if self.proven(criteria) else [one for one in self.judged if unproven(one, criteria)]
+        return sorted(doubtful, key=lambda one: one.error)
 
 
 def find(search: Search) -> Findings:
@@ -65,36 +87,23 @@ def find(search: Search) -> Findings:
     search.say(f"base refitted: held-out error {base.error:.2f} x sensor noise")
     if base.largest_error <= search.criteria.floor:
         shared = shared_offset(base, search.fitted, search.effects, search.shooting.sizes)
-        return Findings(base, nominal, ((shared,),) if shared else (), ())
+        return Findings(base, nominal, (shared,) if shared else ())
+    search.stand(f"constants refitted ({base.error:.2f} x sensor noise on held-out trials)", "every law by itself")
     way, first = proposed(search)
-    looked = max(len(first.scores), 1) if first else 1
-    judged = [search.explained(one, looked) for one in cheapest(way, search)[:JUDGED]]
-    good = [one for one in judged if proven(one, search.criteria)]
-    if good and first:
+    looked = max(len(first.tried), 1) if first else 1  # starts of one law are no other law
+    found = Findings(
+        base,
+        nominal,
+        tuple(search.explained(one, looked) for one in cheapest(way, search)[:JUDGED]),
+        tuple(first.scores) if first else (),
+        looked,
+    )
+    if first and (good := found.proven(search.criteria)):
         chosen = simplest(good, search.criteria)
-        others = [search.explained(one, looked) for one in twins(search, chosen, first, judged)]
-        judged = [*judged, *others]
-        good = [one for one in judged if proven(one, search.criteria)]
-    return arranged(base, nominal, judged, good, first.scores if first else [], search.criteria)
-
-
-def arranged(
-    base: Explanation,
-    nominal: Judgement,
-    judged: Sequence[Explanation],
-    good: Sequence[Explanation],
-    scores: Sequence[Score],
-    criteria: Criteria,
-) -> Findings:
-    """What was judged, by what came of it."""
-    ordered = sorted(good, key=lambda one: one.judgement.costs.sum())
-    kept = [one for one in ordered if not worse(one.judgement, ordered[0].judgement, criteria)]
-    sizes = sorted({len(one.effects) for one in kept})
-    levels = tuple(tuple(one for one in kept if len(one.effects) == size) for size in sizes)
-    unclear = tuple(one for one in judged if one not in good)
-    doubtful = tuple(sorted((e for e in unclear if unproven(e, criteria)), key=lambda e: e.error))
-    surpassed = tuple(one for one in ordered if one not in kept)
-    return Findings(base, nominal, levels, tuple(scores), doubtful if not kept else (), surpassed, unclear)
+        search.stand(f"{chosen.label} ({chosen.error:.2f} x sensor noise on held-out trials)", "its possible twins")
+        others = tuple(search.explained(one, looked) for one in twins(search, chosen, first, found.judged))
+        found = replace(found, judged=(*found.judged, *others))
+    return replace(found, stopped=search.following if search.spent else "")
 
 
 def proposed(search: Search) -> tuple[list[Proposal], Looks | None]:
@@ -102,7 +111,7 @@ def proposed(search: Search) -> tuple[list[Proposal], Looks | None]:
     parent = Proposal((), search.base.fit)
     found: list[Proposal] = []
     first: Looks | None = None
-    while places := off(search.problem, parent.fit, search.criteria.floor):
+    while (places := off(search, parent.fit)) and len(parent.effects) < MOST and not search.spent:
         looks = look(search, parent, [search.fitted.joints[j] for j in places])
         first = first or looks
         if not looks.tried:
@@ -115,16 +124,15 @@ def proposed(search: Search) -> tuple[list[Proposal], Looks | None]:
         if not tried or tried[0].price(search.criteria) >= parent.price(search.criteria):
             break
         parent = tried[0]
-        search.say(f"best so far: {parent_label(parent)} leaves {search.over_noise(parent.fit):.2f} x sensor noise")
-        if len(parent.effects) >= MOST:
-            break
+        left = f"{parent_label(parent)} ({search.over_noise(parent.fit):.2f} x sensor noise on fitted trials)"
+        search.stand(left, "one effect more, and each one taken out")
     return [*found, *reduced(search, parent)], first
 
 
 def reduced(search: Search, one: Proposal) -> list[Proposal]:
     """Sets that are left when one effect after another is taken out, the one that is missed least."""
     found: list[Proposal] = []
-    while len(one.effects) > 1:
+    while len(one.effects) > 1 and not search.spent:
         less = [without(search, one, place) for place in range(len(one.effects))]
         found += less
         one = min(less, key=lambda e: e.fit.cost)
@@ -142,28 +150,134 @@ def cheapest(found: Sequence[Proposal], search: Search) -> list[Proposal]:
 def twins(search: Search, chosen: Explanation, first: Looks, judged: Sequence[Explanation]) -> list[Proposal]:
     """Sets with another law in the place of one of the chosen ones that fit as well with everything free.
 
-    The laws that a chosen one becomes at the edge of its numbers come first; what has many more numbers is no twin.
+    The laws that a chosen one becomes at the edge of its numbers come first, and are tried in any case where an
+    interval reaches that edge, as is the set without the effect. What has many more numbers is no twin.
     """
     known = {named_by(one.effects) for one in judged}
     itself, found = Proposal(chosen.effects, chosen.fit), list[Proposal]()
     for place, effect in enumerate(chosen.effects):
-        looks = first
+        looks, simpler = first, simpler_laws(search, chosen, place)
         if len(chosen.effects) > 1:
             looks = look(search, without(search, itself, place), list(effect.joints))
-        laws = [one for one in looks.tried if one[0].size <= effect.size + 1 and explains_most(search, looks, one[1])]
-        laws.sort(key=lambda one: one[0].effect.name not in effect.effect.contains)
+            if (left := named_by(looks.parent.effects)) not in known:
+                known.add(left)
+                found.append(looks.parent)
+        laws = [
+            one
+            for one in looks.tried
+            if one[0].effect.name in simpler
+            or (one[0].size <= effect.size + 1 and explains_most(search, looks, one[1]))
+        ]
+        laws.sort(key=lambda one: (one[0].effect.name not in simpler, one[0].effect.name not in effect.effect.contains))
         for candidate, fitted in laws[: 2 * JUDGED]:
             names = named_by((*looks.parent.effects, candidate))
-            if len(found) >= JUDGED or names in known:
+            if len(found) >= JUDGED or names in known or search.spent:
                 continue
             known.add(names)
             if not near(search, looks, fitted, [itself]):
                 fitted = further(looks, fitted)
-            if near(search, looks, fitted, [itself]):
+            if candidate.effect.name in simpler or near(search, looks, fitted, [itself]):
                 found.append(refitted(search, looks, [(candidate, fitted)]))
     return [one for one in found if one.fit.cost <= CLOSE * chosen.fit.cost]
+
+
+def simpler_laws(search: Search, chosen: Explanation, place: int) -> set[str]:
+    """Effects that one of a set may just as well be: at a value that its interval reaches it becomes them."""
+    fitted = search.frozen(chosen.fit)
+    first = first_term(fitted.model, chosen.effects, place)
+    width = NORMAL_95 * standard_errors(search.problem, fitted)
+    reach = [
+        (u.key, u.of(fitted.model), w * u.scale, u.high)
+        for u, w in zip(fitted.unknowns, width, strict=True)
+        if u.kind == "effect" and u.place == first
+    ]
+    return {
+        name
+        for name, values in chosen.effects[place].effect.contains.items()
+        for key, value, half, high in reach
+        if key in values and abs(min(values[key], high) - value) <= half
+    }
 
 
 def parent_label(one: Proposal) -> str:
     """In words."""
     return " & ".join(c.label for c in one.effects) or "the refitted model"
+
+
+Array = NDArray[np.float64]
+LEAST = 0.012  # [rad] of a finger: joint offsets below this are ordinary
+UNLIKELY = 0.001  # probability, over all joints, of such offsets by initialising alone at which they are still ordinary
+STRIKING, DOUBTFUL = 0.03, 0.1  # [rad] of a finger, and probability from which on they are worth a word
+
+
+@dataclass(frozen=True)
+class CommonOffset:
+    """A joint offset that is much the same in every initialisation.
+
+    Attributes:
+        joint: its name.
+        offset: mean, as position_offset counts it [rad].
+        initialisations: how many agree.
+        by_chance: probability of such agreement by initialising alone.
+    """
+
+    joint: str
+    offset: float
+    initialisations: int
+    by_chance: float
+
+
+def shared_offset(
+    base: Explanation, fitted: Recording, effects: Sequence[type[Effect]], sizes: Sizes
+) -> Explanation | None:
+    """The base model with the offsets that all initialisations share as an effect; None if there are none.
+
+    A joint offset that differs between initialisations is what initialising does, and no error of the model. Two or
+    three initialisations whose offsets happen to be alike are no evidence either: Student's t decides.
+    """
+    effect = next((effect for effect in effects if effect.constant_reading), None)
+    if effect is None or len(base.judgement.model.offsets) < 2:
+        return None
+    mean, by_chance = _mean_and_chance(base, sizes)
+    least = LEAST * np.array([sizes[joint].of("rad") for joint in fitted.joints])
+    shared = (np.abs(mean) > least) & (by_chance < UNLIKELY)
+    if not shared.any():
+        return None
+    places = np.flatnonzero(shared)
+    joints = tuple(fitted.joints[j] for j in places)
+    name = effect.constant_reading
+    terms = tuple(Term(effect, fitted.joints[j], {name: float(mean[j])}, (name,)) for j in places)
+    offsets = {key: value + np.where(shared, mean, 0.0) for key, value in base.fit.model.offsets.items()}
+    model = Model(base.fit.model.constants, (*base.fit.model.terms, *terms), offsets)
+    candidate = Candidate(effect, joints, {name: float(np.abs(mean[shared]).max())}, sizes)
+    fit = replace(base.fit, model=model)
+    return replace(base, effects=(*base.effects, candidate), fit=fit, p_value=float(by_chance[shared].max()), gain=1.0)
+
+
+def common_offsets(base: Explanation, sizes: Sizes) -> tuple[CommonOffset, ...]:
+    """Large offsets that every initialisation has and that two or three of them do not prove to be the encoder's."""
+    count = len(base.judgement.model.offsets)
+    if count < 2:
+        return ()
+    mean, by_chance = _mean_and_chance(base, sizes)
+    return tuple(
+        CommonOffset(joint, float(mean[j]), count, float(by_chance[j]))
+        for j, (joint, scales) in enumerate(sizes.items())
+        if abs(mean[j]) > STRIKING * scales.of("rad") and UNLIKELY <= by_chance[j] < DOUBTFUL
+    )
+
+
+def _mean_and_chance(base: Explanation, sizes: Sizes) -> tuple[Array, Array]:
+    """Mean offsets (n,) over the initialisations, and how probable their likeness is (Student's t).
+
+    The joints of a machine are initialised in one way, so what their offsets scatter by, each in its own scale, is one
+    number that all of them tell: three initialisations of a single joint say little. Where a joint's own scatter is
+    larger it counts.
+    """
+    scale = np.array([one.of("rad") for one in sizes.values()])
+    offsets = -np.array([base.judgement.model.offsets[k] for k in sorted(base.judgement.model.offsets)]) / scale
+    mean, variance = offsets.mean(axis=0), offsets.var(axis=0, ddof=1)
+    scatter = np.sqrt(np.maximum(variance, variance.mean()))
+    ratio = np.abs(mean) / np.maximum(scatter, 1e-9) * np.sqrt(len(offsets))
+    freedom = (len(offsets) - 1) * len(mean)
+    return mean * scale, np.minimum(1.0, 2.0 * student_t.sf(ratio, freedom) * len(mean))

@@ -12,13 +12,19 @@ from numpy.typing import NDArray
 from tactile_cube.drivetrain.effects.effect import Stage
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit, noise_inflation, precision, renewed
 from tactile_cube.identification.fitting.problem import Problem
-from tactile_cube.identification.search.candidates import Candidate, with_details, without_effect
-from tactile_cube.identification.search.division import some
+from tactile_cube.identification.search.candidates import (
+    Candidate,
+    Score,
+    resized,
+    screen,
+    start,
+    with_details,
+    without_effect,
+)
 from tactile_cube.identification.search.evidence import segment_errors
 from tactile_cube.identification.search.explanation import Proposal, named_by
-from tactile_cube.identification.search.residual_starts import PROFILE, residual_candidates, special_candidates
-from tactile_cube.identification.search.screening import Score, resized, screen, start
-from tactile_cube.identification.search.search import Search
+from tactile_cube.identification.search.residual_starts import residual_candidates
+from tactile_cube.identification.search.search import Search, some
 
 Array = NDArray[np.float64]
 LOOKED_AT = 4  # part of the segments to judge by, on which every law gets its own steps
@@ -26,7 +32,6 @@ STEPS = 2  # of Gauss-Newton that every law gets
 MORE_STEPS = 6  # that a law gets which may be a twin of the chosen one
 SINGLES, SETS = 4, 3  # laws, and sets of several, that are refitted exactly
 CLOSE = 2.5  # squared error over the best one's up to which another law may do as well when everything is free
-SPECIAL = 3  # best laws of which a profile is looked at for simpler ones
 
 
 @dataclass(frozen=True)
@@ -48,20 +53,25 @@ class Looks:
     scores: list[Score] = field(repr=False)
 
 
-def off(problem: Problem, one: Fit, most: float) -> list[int]:
-    """Joints whose error on the fitted trials is above so many times the sensor noise, the whole machine's included."""
-    errors = np.sqrt(np.nanmean(segment_errors(problem, one.residual) ** 2, axis=0))
-    return [j for j, error in enumerate(errors) if error > most]
+def off(search: Search, one: Fit) -> list[int]:
+    """Joints whose error on the fitted trials is above the floor, the whole machine's included.
+
+    Of a set that has explained nearly all of a joint's error, above what is tolerated: a law differs in detail from the
+    real thing, and no other law is called for by that.
+    """
+    criteria, before = search.criteria, joint_errors(search.problem, search.base.fit)
+    errors = joint_errors(search.problem, one)
+    detail = errors**2 - 1.0 <= (1.0 - criteria.nearly_whole) * (before**2 - 1.0)
+    return [int(j) for j in np.flatnonzero(errors > np.where(detail, criteria.tolerated, criteria.floor))]
+
+
+def joint_errors(problem: Problem, one: Fit) -> Array:
+    """RMS error (n,) of a fit at each joint, in units of the sensor noise."""
+    return np.asarray(np.sqrt(np.nanmean(segment_errors(problem, one.residual) ** 2, axis=0)))
 
 
 def look(search: Search, parent: Proposal, at: Sequence[str]) -> Looks:
-    """Every law at these joints gets its own steps beside a set that is fitted.
-
-    Args:
-        search: the recording.
-        parent: the set.
-        at: joints.
-    """
+    """Every law at these joints gets its own steps beside a set that is fitted."""
     problem = Problem(search.shooting, some(search.all_windows, search.segments // LOOKED_AT))
     problem.linearise_starts(parent.fit.model)
     frozen = renewed(problem, parent.fit, *problem.columns(parent.fit.model, parent.fit.unknowns))
@@ -73,13 +83,6 @@ def look(search: Search, parent: Proposal, at: Sequence[str]) -> Looks:
     ]
     scores = screen(problem, frozen, possible)
     tried = sorted((stepped(problem, frozen, one) for one in best_starts(scores)), key=lambda pair: pair[1].cost)
-    simpler = [
-        special
-        for candidate, fitted in tried[:SPECIAL]
-        if PROFILE in candidate.form
-        for special in search.new(special_candidates(candidate, fitted.model.terms[-1], search.effects))
-    ]
-    tried = sorted([*tried, *(stepped(problem, frozen, one) for one in simpler)], key=lambda pair: pair[1].cost)
     return Looks(parent, problem, frozen, tried, scores)
 
 
@@ -113,16 +116,18 @@ def grown(search: Search, looks: Looks) -> list[Proposal]:
         by_name.setdefault((candidate.effect.name, candidate.joints), (candidate, fitted))
     found: list[Proposal] = []
     for one in list(by_name.values())[:SINGLES]:
+        if search.spent:
+            break
         if not whole(search, found) or near(search, looks, one[1], found):
             found.append(refitted(search, looks, [one]))
     if not whole(search, found):
-        found += [refitted(search, looks, laws) for laws in sets(looks)[:SETS]]
+        found += [refitted(search, looks, laws) for laws in sets(looks)[:SETS] if not search.spent]
     return sorted(found, key=lambda one: one.price(search.criteria))
 
 
 def whole(search: Search, found: Sequence[Proposal]) -> bool:
     """Whether one of the sets leaves no joint off."""
-    return any(not off(search.problem, one.fit, search.criteria.floor) for one in found)
+    return any(not off(search, one.fit) for one in found)
 
 
 def near(search: Search, looks: Looks, fitted: Fit, found: Sequence[Proposal]) -> bool:

@@ -185,7 +185,10 @@ def describe_comparison(
         fit=error.normalised_fit(trials, raw, joints),
         floor=floor,
         regimes=table,
-        sentences=where_it_fails(table, summary.joints, floor, recording.units),
+        sentences=[
+            *where_it_fails(table, summary.joints, floor, recording.units),
+            *(one.sentence(recording.units[one.joint]) for one in floor.drift),
+        ],
         whiteness=whiteness(trials, errors, joints),
         failing_intervals=[
             interval

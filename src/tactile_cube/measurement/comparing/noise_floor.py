@@ -5,77 +5,10 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_cube.measurement.comparing.repeats import Drift, Repeats, aligned_repeats, drifts
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.recordings.trial import Array, Trial
-
-LONGEST_LAG = 0.3  # [s] two starts of one command are not further apart
-SAME = 0.02  # share of a command's spread by which a repeat may differ
-LEFT_START = 0.1  # [rad] of motion after which a joint no longer knows where friction held it at the start
-SHORTEST = 0.8  # share of the shorter trial that must overlap
-
-
-def aligned_repeats(trials: Sequence[Trial]) -> list[list[Array]]:
-    """Groups of two or more repeats; each is (n, joints) positions [rad], nan where it says nothing about noise.
-
-    Trials repeat each other if they are of one kind and their commands agree after a shift in time. Left out are
-    bridged samples and a joint's wait at its start, which differs from repeat to repeat and which a simulation starts
-    from.
-    """
-    groups: list[list[Array]] = []
-    waiting = list(trials)
-    while waiting:
-        same = repeats_of(waiting, 0)
-        if same:
-            members = [(waiting[0], 0), *((waiting[place], lag) for place, lag in same)]
-            start = max(0, *(lag for _, lag in members))
-            measured = [np.where(_telling(trial), trial.position, np.nan)[start - lag :] for trial, lag in members]
-            length = min(map(len, measured))
-            groups.append([positions[:length] for positions in measured])
-        taken = {0, *(place for place, _ in same)}
-        waiting = [trial for place, trial in enumerate(waiting) if place not in taken]
-    return groups
-
-
-def repeats_of(trials: Sequence[Trial], index: int) -> list[tuple[int, int]]:
-    """Trials that play the command of one again: their places, and by how many samples each starts later in it."""
-    first = trials[index]
-    lags = {
-        place: lag_between(first.command, other.command, first.step)
-        for place, other in enumerate(trials)
-        if place != index
-        and (first.kind, first.clamped, first.force) == (other.kind, other.clamped, other.force)
-        and all(np.array_equal(getattr(first.gains, k), getattr(other.gains, k)) for k in ("kp", "kd"))
-    }
-    return [(place, lag) for place, lag in lags.items() if lag is not None]
-
-
-def lag_between(first: Array, other: Array, step: float) -> int | None:
-    """Samples (one a `step` [s]) by which `other` starts later in the same command (n, joints); None: another one."""
-    if len(first) == len(other) and _differs(first, other) < SAME:
-        return 0
-    longest = round(LONGEST_LAG / step)
-    best, difference = 0, np.inf
-    for lag in range(-longest, longest + 1):
-        a, b = first[max(lag, 0) :], other[max(-lag, 0) :]
-        n = min(len(a), len(b))
-        if n >= SHORTEST * min(len(first), len(other)) and (d := _differs(a[:n], b[:n])) < difference:
-            best, difference = lag, d
-    return best if difference < SAME else None
-
-
-def _differs(first: Array, other: Array) -> float:
-    spread = float(np.sqrt(np.mean((first - first.mean(axis=0)) ** 2)))
-    return float(np.sqrt(np.mean((first - other) ** 2))) / spread if spread > 0 else np.inf
-
-
-def _telling(trial: Trial) -> NDArray[np.bool_]:
-    """(n, joints): measured, and the joint has left its start (if it ever does)."""
-    left = np.abs(trial.position - trial.position[0]) > LEFT_START
-    gone = np.maximum.accumulate(left, axis=0) | ~left.any(axis=0)
-    return np.asarray(gone & trial.valid[:, None])
-
+from tactile_cube.measurement.recordings.trial import Array
 
 LEAST = 1e-6  # [rad] no sensor is better; keeps the ratio of error to floor finite
 
@@ -90,6 +23,7 @@ class NoiseFloor:
     repeats: int  # trials that had a repeat
     step_size: dict[str, float]  # what the simulator's time step adds, no part of the floor; empty: not asked for
     sensor: dict[str, float] = field(default_factory=dict)  # noise of the position sensor, the floor if it is a guess
+    drift: tuple[Drift, ...] = ()  # what repeats change by in one direction, no part of the floor
 
     @property
     def reachable(self) -> float:
@@ -102,29 +36,31 @@ def noise_floor(recording: Recording, step_size: Mapping[str, float] | None = No
     groups = aligned_repeats(recording.trials)
     sensor = sensor_noise(recording)
     variance = np.maximum(sensor, LEAST) ** 2  # repeats of a simulation differ by less than its sensor's noise
+    drift = drifts(recording, groups, sensor)
+    steady = ~np.isin(recording.joints, [one.joint for one in drift])  # where a machine changes repeats tell no noise
     if groups:
-        variance = np.maximum(variance, _scatter(groups))
+        variance = np.where(steady, np.maximum(variance, _scatter(groups)), variance)
     return NoiseFloor(
         float(np.sqrt(variance.mean())),
         dict(zip(recording.joints, map(float, np.sqrt(variance)), strict=True)),
-        "repeats" if groups else "guess",
-        sum(len(group) for group in groups),
+        "repeats" if groups and steady.any() else "guess",
+        sum(len(group.trials) for group in groups),
         dict(step_size or {}),
         dict(zip(recording.joints, map(float, sensor), strict=True)),
+        drift,
     )
 
 
-def _scatter(groups: list[list[Array]]) -> Array:
+def _scatter(groups: Sequence[Repeats]) -> Array:
     """Variance (joints,) of a repeat about the mean of its group, each repeat's own constant removed."""
-    joints = groups[0][0].shape[1]
+    joints = groups[0].positions.shape[2]
     total, freedom = np.zeros(joints), np.zeros(joints)
     for group in groups:
-        stack = np.stack(group)
-        stack = np.where(np.isfinite(stack).all(axis=0), stack, np.nan)
+        stack = np.where(np.isfinite(group.positions).all(axis=0), group.positions, np.nan)
         stack = stack - np.nanmean(stack, axis=1, keepdims=True)
         deviation = stack - stack.mean(axis=0)
         total += np.nansum(deviation**2, axis=(0, 1))
-        freedom += np.isfinite(deviation[0]).sum(axis=0) * (len(group) - 1)
+        freedom += np.isfinite(deviation[0]).sum(axis=0) * (len(stack) - 1)
     return np.asarray(total / freedom)
 
 

@@ -116,6 +116,7 @@ class TrialEntry(Strict):
     object: Grasp | None = None  # the hand holds the recording's object (bench test of friction at the fingertips)
     # intervals of the file [s from its first row] that follow no model; what is left becomes trials of its own
     exclude: list[tuple[NotNegative, NotNegative]] = Field(default_factory=list)
+    unjudged: NotNegative = 0.0  # [s] at its start that count in no error, as they follow commands before the log
     note: str = ""
 
 

@@ -1,5 +1,6 @@
 """A recording on disk: recording.yaml, the rig's URDF and one table a trial, read and checked."""
 
+import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -37,8 +38,12 @@ def read_recording(folder: str | Path) -> Recording:
         InputError: naming file, column, row and value of what cannot be used.
     """
     folder = Path(folder)
-    if not folder.is_dir():
-        raise InputError(f"recording={folder}: no such folder; a recording is a folder with {DESCRIPTION} in it")
+    if not os.path.lexists(folder / DESCRIPTION):
+        what = "no such folder" if not folder.exists() else f"{DESCRIPTION}: no such file"
+        raise InputError(
+            f"recording={folder}: {what}; record makes a recording of logs: source=csv source.files={folder} "
+            "source.urdf=FILE out=FOLDER"
+        )
     file = below(folder, DESCRIPTION, f"recording={folder}")
     description = read_schema(file, Description)
     path = below(folder, description.rig, f"{file}: key 'rig'")
@@ -78,7 +83,7 @@ def _assemble(folder: Path, description: Description, rig: Rig) -> Recording:
         warnings += trial.warnings
     if not trials:
         raise InputError(f"{file}: key 'trials': 'exclude' leaves nothing of any trial")
-    return Recording(folder, description, rig, gains, nominal, tuple(trials), tuple(warnings))
+    return Recording(folder, description, rig, gains, nominal, on_one_clock(trials), tuple(warnings))
 
 
 def _trial(path: Path, most: int, entry: TrialEntry, description: Description, rig: Rig, key: str) -> Trial:
@@ -99,6 +104,7 @@ def _trial(path: Path, most: int, entry: TrialEntry, description: Description, r
     stamps = (columns.time[outlying] - columns.time[0]) * rate
     beside = np.concatenate([np.floor(stamps), np.ceil(stamps)]).astype(np.int64)
     valid[np.minimum(beside, len(valid) - 1)] = False
+    valid &= grid.time >= entry.unjudged
     return Trial(
         name=path.stem,
         **{key: getattr(entry, key) for key in ("file", "kind", "initialisation", "force", "clamped", "touch")},
@@ -107,6 +113,7 @@ def _trial(path: Path, most: int, entry: TrialEntry, description: Description, r
         gains=gains,
         warnings=tuple(warnings + time_warnings + single),
         load=load_of(description.object, entry.object) if description.object and entry.object else None,
+        begun=float(columns.time[0]),
     )
 
 
@@ -126,4 +133,22 @@ def without_excluded(trial: Trial, intervals: Sequence[tuple[float, float]], key
     edges = np.flatnonzero(np.diff(np.concatenate([[False], kept, [False]]).astype(int)))
     pieces = [slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= MINIMUM_SAMPLES]
     parts = [rows_of(trial, rows) for rows in pieces]
-    return [replace(part, name=f"{trial.name}_{k}", time=part.time - part.time[0]) for k, part in enumerate(parts)]
+    return [
+        replace(part, name=f"{trial.name}_{k}", time=part.time - part.time[0], begun=part.begun + part.time[0])
+        for k, part in enumerate(parts)
+    ]
+
+
+def on_one_clock(trials: Sequence[Trial]) -> tuple[Trial, ...]:
+    """Return the trials, each `begun` so long after the first one of its initialisation.
+
+    Where stamps overlap, as those of logs that all count from 0 do, they are no clock: each trial begins at 0.
+    """
+    first = dict[int, float]()
+    last = dict[int, float]()
+    for trial in sorted(trials, key=lambda one: one.begun):
+        key = trial.initialisation
+        overlaps = key in last and trial.begun < last[key] - 0.5 * trial.step
+        first[key] = np.nan if overlaps else first.get(key, trial.begun)
+        last[key] = trial.begun + trial.duration
+    return tuple(replace(one, begun=float(np.nan_to_num(one.begun - first[one.initialisation]))) for one in trials)

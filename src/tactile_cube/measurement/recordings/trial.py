@@ -64,12 +64,13 @@ class Trial(TrialColumns):
         file: path inside the recording's folder.
         kind: kind of excitation; trials of one kind repeat one command.
         initialisation: robot initialisation it belongs to; each has joint offsets of its own.
-        valid: (n,) False where a dropped sample was interpolated; such samples count in no error.
+        valid: (n,) False where a sample counts in no error: it was interpolated, or follows commands before the log.
         gains: the controller in this trial.
         force: a known force on a link, or None.
         clamped: the links were held still.
         touch: the link ended at a known place, or None.
         load: the object that the hand held, or None.
+        begun: when it began, from the start of its initialisation [s]; 0 where the stamps of its file do not tell.
     """
 
     name: str
@@ -83,6 +84,7 @@ class Trial(TrialColumns):
     touch: Touch | None = None
     warnings: tuple[str, ...] = field(default=(), repr=False)
     load: Load | None = None
+    begun: float = 0.0
 
     @property
     def linked(self) -> NDArray[np.int64]:

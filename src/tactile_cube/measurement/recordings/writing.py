@@ -13,7 +13,7 @@ import yaml
 from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError, warn
-from tactile_cube.measurement.recordings.columns import SIGNALS, rows_of
+from tactile_cube.measurement.recordings.columns import MINIMUM_SAMPLES, SIGNALS, rows_of
 from tactile_cube.measurement.recordings.description import Description, TrialEntry
 from tactile_cube.measurement.recordings.reading import DESCRIPTION, read_recording
 from tactile_cube.measurement.recordings.recording import Recording
@@ -99,8 +99,10 @@ def _narrow(columns: Mapping[str, Array], rows: slice = slice(None)) -> dict[str
 
 
 def cut_trial(trial: TrialTable, length: float | None) -> list[TrialTable]:
-    """Pieces of `length` [s] of a trial; a rest of less than half of that is dropped."""
+    """Pieces of `length` [s] of a trial, on its clock; a rest of less than half of that is dropped."""
     duration = float(trial.time[-1] - trial.time[0])
+    if length is not None and not length * len(trial.time) >= MINIMUM_SAMPLES * duration:
+        raise InputError(f"source.length={length:g}: pieces need {MINIMUM_SAMPLES} rows; give more seconds")
     if length is None or duration < 1.5 * length:
         return [trial]
     starts = np.arange(0.0, duration - 0.5 * length, length) + trial.time[0]
@@ -110,16 +112,16 @@ def cut_trial(trial: TrialTable, length: float | None) -> list[TrialTable]:
     for number, (start, end) in enumerate(pairwise(edges)):
         piece = rows_of(trial, slice(start, end))
         entry = trial.entry.model_copy(update={"file": f"{stem}_part{number:02d}.{ending}"})
-        pieces.append(replace(piece, entry=entry, time=piece.time - piece.time[0]))
+        pieces.append(replace(piece, entry=entry))
     return pieces
 
 
 def require_free(out: Path) -> None:
     """Refuse, by an InputError, a folder that holds something."""
     if (out / DESCRIPTION).exists():
-        raise InputError(f"out={out}: holds a recording already; choose another folder or remove it")
+        raise InputError(f"{out}: holds a recording already; choose another folder or remove it")
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise InputError(f"out={out}: is there already and not empty; choose another folder or remove it")
+        raise InputError(f"{out}: is there already and not empty; choose another folder or remove it")
 
 
 def write_recordings(out: Path, parts: Mapping[str, RecordingTables]) -> None:

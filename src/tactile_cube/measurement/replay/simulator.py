@@ -86,6 +86,7 @@ class Simulator:
         # the whole catalogue: one kernel, compiled once, for every model of this rig
         known = tuple(dict.fromkeys([*catalogue().values(), *effects]))
         self.plant = Plant([self.tree], recording.step / self.substeps, known, recording.joints)
+        self.simulated = 0.0  # trial time that models were simulated through [s]; those that follow a path a third
         self.workers = min(4, len(os.sched_getaffinity(0)))
         self._pool = ThreadPoolExecutor(self.workers)
 
@@ -127,6 +128,7 @@ class Simulator:
             What a log would show, (M, 1 or 2, S, K segment, sensors): positions [rad] and, if wanted, torques [N m].
         """
         out = np.zeros((len(models), 1 + torques, *windows[0].measured.shape))
+        self._count(len(models) / (1 if near is None else 3), windows[0])
         if corrections is None:
             corrections = np.zeros((len(models), 2 * len(self.recording.joints)))
         whole = len(models) - len(models) % self.workers  # a model a core; the last ones' windows go to all cores
@@ -139,10 +141,14 @@ class Simulator:
     def path(self, model: Model, windows: Windows) -> Path:
         """A model's way through windows, which its neighbours may follow."""
         out = np.zeros((1, *windows.measured.shape))
+        self._count(1.0, windows)
         steps = out.shape[2] * windows.substeps * self.plant.kernel.PATH_WIDTH
         path = Path(out[0], self._mechanics(self.memory(model)), np.zeros((len(windows), steps)))
         self._one(model, windows, np.zeros(2 * len(self.recording.joints)), out, self._pool, path, follows=False)
         return path
+
+    def _count(self, models: float, windows: Windows) -> None:
+        self.simulated += models * len(windows) * windows.measured.shape[1] * self.recording.step / self.time
 
     def _mechanics(self, memory: Array) -> Array:
         return np.concatenate([self.plant.view(memory, key).ravel() for key in MECHANICS])
@@ -250,7 +256,7 @@ class Simulator:
         self.plant.view(memory, "offset")[:, 0] += self.tree.ratio * offsets[:, self.tree.follow]
         self.plant.view(memory, "angle_offset")[:] = offsets
         self.plant.reset(memory, self._links(model, windows), windows.speed[:, 0])
-        self.plant.view(memory, "step")[:, 0] = windows.time / self.plant.dt
+        self.plant.view(memory, "step")[:, 0] = (windows.begun + windows.time) / self.plant.dt
         self.plant.view(memory, "unsure")[:] = SMOOTHING * self.time
         self.plant.view(memory, "reading")[:] = 0  # a row is read as its first step begins
         for k, key in enumerate(("kp", "kd", "torque_limit")):

@@ -50,6 +50,7 @@ class Windows:
         trial: (S,) index of the trial.
         initialisation: (S,) robot initialisation.
         time: (S,) of the first row in its trial [s].
+        begun: (S,) when the trial began, from the start of its initialisation [s].
         clamped: (S,) the links were held still.
         initial_state: (S, 2 n) how far links stand from where their sensors put them as the window begins [rad], and
             how much faster they are [rad/s]; see `initial_states`.
@@ -76,6 +77,7 @@ class Windows:
     trial: NDArray[np.int64]
     initialisation: NDArray[np.int64]
     time: Array
+    begun: Array
     clamped: NDArray[np.bool_]
     initial_state: Array
     trial_start: Array
@@ -116,7 +118,7 @@ class Windows:
         return values.reshape(len(self) * self.segments, -1)
 
 
-ROWS = tuple(field.name for field in fields(Windows))[:16]  # arrays with one row a window
+ROWS = tuple(field.name for field in fields(Windows))[:17]  # arrays with one row a window
 
 
 def cut(
@@ -225,6 +227,7 @@ def _pieces(recording: Recording, trial: Trial, index: int, sizes: Cut) -> Itera
             "trial": index,
             "initialisation": trial.initialisation,
             "time": first * trial.step,
+            "begun": trial.begun,
             "clamped": trial.clamped,
             "initial_state": np.zeros(2 * position.shape[1]),
             "trial_start": trial_start,

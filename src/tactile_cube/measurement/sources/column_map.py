@@ -26,9 +26,8 @@ POSITION = _vocabulary(
 LINK, FEEDFORWARD = _vocabulary("link load output secondary"), _vocabulary("feedforward forward ff")
 ANGLE = _vocabulary("position pos angle q encoder enc theta")  # a "Present Load" is none
 TORQUE = _vocabulary("torque tau effort moment force nm mnm")
-NOT_USED = _vocabulary(  # load: of hobby servos, a share of something
-    "velocity vel speed dq qdot qvel omega acc acceleration ddq current curr voltage volt temperature temp pwm "
-    "volts duty enable enabled flag error err status index frame load link"
+NOT_USED = NO_TORQUE | _vocabulary(
+    "velocity vel speed dq qdot qvel omega acc acceleration ddq temperature temp error err index frame link"
 )
 VOLTAGE, SUPPLY = _vocabulary("voltage volt volts"), _vocabulary("bus vbus supply battery input vin")
 ELEMENT = re.compile(r"\[\d+\]$")  # of an array
@@ -61,12 +60,7 @@ def map_columns(
 ) -> ColumnMap:
     """The map of a table's columns: joints as `given`, or else all of `joints` that the names of columns show.
 
-    Args:
-        names: of the columns.
-        joints: that may be meant, in the URDF's order.
-        given: what the user said.
-        mode: position, torque, voltage or free, which needs no command.
-        flags: columns of 0 and 1 alone, which are no torques.
+    `flags` are columns of 0 and 1 alone, which are no torques; in mode `free` no command is needed.
 
     Raises:
         InputError: something is missing or can be read in two ways.
@@ -121,7 +115,6 @@ def _guessed(
 
 
 def _signals(names: Sequence[str], joints: Sequence[str], mode: str, flags: Collection[str]) -> dict[str, str]:
-    """Column -> command, position or torque."""
     signals: dict[str, str] = {}
     for name in names:
         signal = _signal_of(name)
@@ -157,16 +150,19 @@ def _owners(names: Sequence[str], joints: Sequence[str]) -> dict[str, str]:
 
 NEEDED = {mode: ("command", "position") for mode in ("position", "torque", "voltage")} | {"free": ("position",)}
 """Mode -> signals that a joint must have."""
-COMMANDED = {"position": "command", "torque": "command (a torque)", "voltage": "command (a voltage)"}
+COMMANDED = {
+    "position": "a commanded position", "torque": "a commanded torque", "voltage": "a commanded voltage",
+    "free": "a swing without command",
+}  # fmt: skip
 
 
 def _require_whole(chosen: Mapping[str, Mapping[str, str]], names: Sequence[str], mode: str) -> None:
     if not chosen:
-        what = "a position" if mode == "free" else f"both a {COMMANDED[mode]} and a position"
-        hint = ", or source.controller.mode=torque, voltage or free (a swing without command)"
+        what = "a position" if mode == "free" else f"both {COMMANDED[mode]} and a position"
+        others = [f"{one} ({COMMANDED[one]})" for one in COMMANDED if one != mode]
         raise InputError(
             f"source.columns: no joint of the URDF has {what} among the columns {list(names)}; "
-            f"say which they are: {EXAMPLE}{hint if mode == 'position' else ''}"
+            f"say which they are: {EXAMPLE}, or source.controller.mode={', '.join(others)}"
         )
     for joint, entry in chosen.items():
         missing = [signal for signal in NEEDED[mode] if signal not in entry]
@@ -204,12 +200,10 @@ def _signal_of(name: str) -> str | None:
 
 
 def _without_unit(name: str) -> list[str]:
-    """The words of a name but for units."""
     known = {unit for spellings in UNITS.values() for unit in spellings}
     return [word for word in words(name) if word not in known]
 
 
 def _names(name: str, joint: str) -> bool:
-    """Whether a column's name has that of a joint in it."""
     said, part = words(name), words(joint)
     return "".join(part) in said or any(said[k : k + len(part)] == part for k in range(len(said) - len(part) + 1))

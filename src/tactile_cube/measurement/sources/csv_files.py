@@ -2,28 +2,29 @@
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from glob import glob
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_cube.drivetrain.model_file import Strict
 from tactile_cube.errors import InputError
-from tactile_cube.measurement.comparing.noise_floor import lag_between
+from tactile_cube.measurement.comparing.repeats import lag_between
 from tactile_cube.measurement.recordings.columns import SIGNALS, TrialColumns
 from tactile_cube.measurement.recordings.consistency import gains_of
-from tactile_cube.measurement.recordings.description import Description, PerJoint, TrialEntry
+from tactile_cube.measurement.recordings.description import Description, PerJoint, Positive, Rate, TrialEntry
 from tactile_cube.measurement.recordings.plausibility import torque_over_law
 from tactile_cube.measurement.recordings.rig import Rig, RigJoint
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable, cut_trial
-from tactile_cube.measurement.sources.column_map import NEEDED, ColumnMap, map_columns
+from tactile_cube.measurement.sources.column_map import ColumnMap, map_columns
 from tactile_cube.measurement.sources.gains import estimated_gains, gain_doubts
 from tactile_cube.measurement.sources.log_file import Log, read_logs
 from tactile_cube.measurement.sources.mechanism import Mechanism
-from tactile_cube.measurement.sources.source import described, rate_of, with_stated
+from tactile_cube.measurement.sources.source import described, listed, rate_of, with_stated
 from tactile_cube.measurement.sources.tidy import apart, joined, trials_of, without_equal_rows
 from tactile_cube.measurement.sources.units import (
     RANGE,
@@ -45,92 +46,124 @@ Units = dict[str, dict[str, Unit]]
 OF_SOME = {"link_position": np.nan, "feedforward": 0.0}
 """Signals that some joints may have, and what stands for those of the others."""
 SHOWN = 3  # steps of one kind
+REMEMBERED = 0.4  # [s] by which a drive has forgotten earlier commands, but for a rate limit
+MOVING, LOOK = 0.2, 0.03  # of a trial's usual speed, and [s] that it is read from
 ASIDE = ("words", "left out", "array", "list column")
 
 
+class LoggedController(Strict):
+    """What is said of the controller that made the logs."""
+
+    kp: PerJoint | None = None
+    kd: PerJoint | None = None
+    torque_limit: PerJoint | None = None
+    rate_hz: Rate | None = None
+    mode: Literal["position", "torque", "voltage", "free"] = "position"
+    kt: Positive | None = None
+    R: Positive | None = None
+
+    @property
+    def motor(self) -> tuple[float, float]:
+        """Torque of a volt at standstill, kt / R, and damping by the back-EMF, kt^2 / R.
+
+        Raises:
+            InputError: one of them is not stated.
+        """
+        if self.kt is None or self.R is None:
+            raise InputError(
+                f"source.controller.kt={self.kt}, R={self.R}: mode=voltage needs kt [N m/A] and R [ohm] of the motor, "
+                "as seen at the joint: torque = kt / R (u - kt dq)"
+            )
+        return self.kt / self.R, self.kt**2 / self.R
+
+
 @dataclass(frozen=True)
-class CsvFiles:
+class CsvFiles(Mechanism):
     """Imports logs; conf/source/csv.yaml says what each setting means, and its units."""
 
-    files: Iterable[str]
-    urdf: str | None
-    robot: str | None
-    mass: float | None
-    lever: float | None
-    servo: str | None
-    gain: float | None
-    controller: Mapping[str, Any]
+    files: str | Sequence[str]
+    controller: LoggedController
     columns: Mapping[str, str | Mapping[str, str]] | None
     nominal: Mapping[str, PerJoint | None]
-    gravity: Iterable[float]
-    rate: float | None
+    gravity: tuple[float, float, float]
+    rate: Rate | None
     angle_unit: str | int | None
     length_unit: str | None
     time_unit: str | None
     torque_unit: str | None
     calibration: str | None
     gear: float | None
-    read: str
+    read: Literal["before", "after"]
     resolution: float
-    length: float | None
-    initialisation: Iterable[int] | None
-    kind: Iterable[str] | None
+    length: Positive | None
+    initialisation: Sequence[int] | None
+    kind: Sequence[str] | None
 
     def recordings(self, seed: int) -> dict[str, RecordingTables]:
         """One recording of all files."""
-        mode, rig = str(self.controller.get("mode") or "position"), self._mechanism.rig()
-        if mode not in NEEDED:
-            raise InputError(f"source.controller.mode={mode}: unknown; choose one of {', '.join(NEEDED)}")
+        mode, rig = self.controller.mode, self.rig()
         left: list[str] = []
-        logs = self._logs([name for name, joint in rig.joints.items() if joint.mimics is None], mode)
-        columns = self._columns(logs[0], rig, mode)
+        logs = self._logs([name for name, joint in rig.joints.items() if joint.mimics is None])
+        columns = self._columns(logs[0], rig)
         whole = _each(lambda log: [_checked(log, columns)], logs, left)
         stamps = None
         if columns.time is not None:
             stamps = time_unit(self.time_unit, _label(whole[0], columns.time), whole[0].table[columns.time])
         second = stamps.size if stamps is not None else 1.0
         pieces = _each(lambda log: trials_of(log, columns, second, mode == "free"), whole, left)
-        units = self._units(pieces, columns, rig.joints, mode)
+        units = self._units(pieces, columns, rig.joints)
         trials = [_trial(piece, columns, units, second, self.rate) for piece in pieces]
         rate = self.rate if self.rate is not None else rate_of(trials[0].time, 3, str(pieces[0].path))
         trials = self._named(trials, pieces, logs, 1 / rate)
-        pull = float(np.linalg.norm(list(self.gravity)))
-        rig = self._mechanism.sized(rig, trials, mode, self.controller.get("kp"), pull)
-        description = self._description(trials, list(columns.joints), rig, rate, mode)
+        rig = self.sized(rig, trials, mode, self.controller.kp, float(np.linalg.norm(self.gravity)))
+        description = self._description(trials, list(columns.joints), rig, rate)
         doubts = [*columns.doubts, *rig.doubts, *_doubts(units, columns, trials, description, rig)]
         doubts += [f"left out: {reason}" for reason in left]
-        by = "source.kind" if self.kind is not None else "file names and commands"
         count = Counter(trial.entry.kind for trial in trials)
         repeats = ", ".join(f"{kind} x {n}" if n > 1 else kind for kind, n in count.items())
+        by = "source.kind" if self.kind is not None else "file names and commands"
         understood = [*_steps(pieces), *_rows(columns, units, stamps, rate), ("kinds", repeats, by)]
-        understood += rig.understood(list(columns.joints))
         tables = [piece for trial in trials for piece in cut_trial(trial, self.length)]
+        if moving := [k for k, table in enumerate(tables) if mode == "position" and _begins_in_motion(table)]:
+            late = f"{len(moving)} of {len(tables)} trials; their first {REMEMBERED:g} s count in no error"
+            understood.append(("begin in motion", late, "commands before are unknown"))
+        for k in moving:
+            entry = tables[k].entry.model_copy(update={"unjudged": REMEMBERED})
+            tables[k] = replace(tables[k], entry=entry)
+        understood += rig.understood(list(columns.joints))
         degrees = {joint: "deg" for joint, one in units.items() if one["position"].name.split()[0] == "deg"}
         description = description.model_copy(update={"doubts": list(dict.fromkeys(doubts)), "shown_in": degrees})
         return {"": RecordingTables(description, rig.text, tables, [row for row in understood if row[1]])}
 
-    @property
-    def _mechanism(self) -> Mechanism:
-        return Mechanism(self.urdf, self.robot, self.mass, self.lever, self.servo, self.gain)
-
-    def _logs(self, joints: Sequence[str], mode: str) -> list[Log]:
-        """All logs, each under a name of its own."""
-
+    def _logs(self, joints: Sequence[str]) -> list[Log]:
         def whole(names: Sequence[str]) -> bool:
             try:
-                return set(map_columns(names, joints, self.columns or {}, mode).names) <= set(names)
+                return set(map_columns(names, joints, self.columns or {}, self.controller.mode).names) <= set(names)
             except InputError:
                 return False
 
-        logs = joined([apart(log) for path in self._paths() for log in read_logs(path)], whole)
-        names = _distinct([log.path for log in logs])
+        paths: list[Path] = []
+        for pattern in listed(self.files):
+            matches = [Path(name) for name in sorted(glob(pattern, recursive=True))]
+            if not matches:
+                raise InputError(f"source.files: {pattern} matches no file{_beside(Path(pattern))}")
+            paths += matches
+        if not paths:
+            raise InputError("source.files: no file given")
+        logs = joined([apart(log) for path in dict.fromkeys(paths) for log in read_logs(path)], whole)
+        # files of one name in several folders have the folder's before theirs
+        count = Counter(log.path.stem for log in logs)
+        names = [
+            log.path.stem if count[log.path.stem] == 1 else f"{log.path.parent.name}_{log.path.stem}" for log in logs
+        ]
+        names = [name if names.count(name) == 1 else f"{name}_{k}" for k, name in enumerate(names)]
         return [replace(log, name=name, whole=name) for log, name in zip(logs, names, strict=True)]
 
-    def _columns(self, log: Log, rig: Rig, mode: str) -> ColumnMap:
+    def _columns(self, log: Log, rig: Rig) -> ColumnMap:
         joints = [name for name, joint in rig.joints.items() if joint.mimics is None]
         flags = [name for name, values in log.table.items() if is_flag(values)]
         try:
-            columns = map_columns(list(log.table), joints, self.columns or {}, mode, flags)
+            columns = map_columns(list(log.table), joints, self.columns or {}, self.controller.mode, flags)
         except InputError as error:
             aside = "; ".join(how for what, how in log.steps if what in ASIDE)
             raise InputError(f"{log.path}: {error}{f' ({aside})' if aside else ''}") from None
@@ -145,10 +178,9 @@ class CsvFiles:
             )
         return columns
 
-    def _units(self, logs: Sequence[Log], columns: ColumnMap, joints: Mapping[str, RigJoint], mode: str) -> Units:
-        """The units of the signals, told by the values of all logs together."""
+    def _units(self, logs: Sequence[Log], columns: ColumnMap, joints: Mapping[str, RigJoint]) -> Units:
         units: Units = {}
-        spans = {} if self.calibration is None else calibrated_spans(Path(self.calibration))
+        mode, spans = self.controller.mode, {} if self.calibration is None else calibrated_spans(Path(self.calibration))
         if spans and self.angle_unit not in (RANGE, "deg"):
             raise InputError(f"source.calibration={self.calibration}: say source.angle_unit=range (or deg) beside it")
         for name, entry in columns.joints.items():
@@ -160,7 +192,7 @@ class CsvFiles:
             for signal, column in entry.items():
                 label = _label(logs[0], column)
                 if signal == "command" and mode == "voltage":
-                    found[signal] = voltage_unit(label, self._motor()[0])
+                    found[signal] = voltage_unit(label, self.controller.motor[0])
                 elif signal in ("torque", "feedforward") or (mode == "torque" and signal == "command"):
                     found[signal] = torque_unit(self.torque_unit, label, joint.prismatic, values[signal])
                 else:
@@ -173,20 +205,9 @@ class CsvFiles:
                 found |= geared(found, values, entry, self.gear)
         return units
 
-    def _motor(self) -> tuple[float, float]:
-        """Torque of a volt at standstill, kt / R, and damping by the back-EMF, kt^2 / R."""
-        kt, resistance = (self.controller.get(key) for key in ("kt", "R"))
-        if not all(isinstance(one, int | float) and 0 < one < np.inf for one in (kt, resistance)):
-            raise InputError(
-                f"source.controller.kt={kt}, R={resistance}: mode=voltage needs kt [N m/A] and R [ohm] of the motor, "
-                "as seen at the joint: torque = kt / R (u - kt dq)"
-            )
-        return float(kt) / float(resistance), float(kt) ** 2 / float(resistance)  # type: ignore[arg-type]
-
     def _named(
         self, trials: Sequence[TrialTable], pieces: Sequence[Log], logs: Sequence[Log], step: float
     ) -> list[TrialTable]:
-        """The trials with their kinds and initialisations."""
         names = [log.name for log in logs]
         whose = [names.index(piece.whole) for piece in pieces]
         starts = _one_each(self.initialisation, names, "initialisation", [0] * len(names))
@@ -199,47 +220,30 @@ class CsvFiles:
         ]
         return [replace(trial, entry=entry) for trial, entry in zip(trials, entries, strict=True)]
 
-    def _description(
-        self, trials: Sequence[TrialTable], joints: list[str], rig: Rig, rate: float, mode: str
-    ) -> Description:
+    def _description(self, trials: Sequence[TrialTable], joints: list[str], rig: Rig, rate: float) -> Description:
         """What recording.yaml is to say; gains that nobody states are unknown, and begin where the log has them."""
-        said = with_stated({k: v for k, v in self.controller.items() if k not in ("kt", "R")}, rig.gains, joints)
+        mode, stated = self.controller.mode, self.controller.model_dump(exclude={"kt", "R"}, exclude_none=True)
+        said = with_stated({**stated, "mode": "torque" if mode == "free" else mode}, rig.gains, joints)
         nominal = with_stated(self.nominal, rig.nominal, joints)
-        stated = {key for key, value in [*self.controller.items(), *self.nominal.items()] if value is not None}
-        unknown = [key for key in rig.unknown if key not in stated and (key != "kd" or mode == "position")]
+        known = {*stated, *(key for key, value in self.nominal.items() if value is not None)}
+        unknown = [key for key in rig.unknown if key not in known and (key != "kd" or mode == "position")]
         if mode == "position":
             lacking = [key for key in ("kp", "kd") if key not in said]
             lacking += [key for key in ("reflected_inertia",) if lacking and key not in nominal]
             unknown = list(dict.fromkeys([*unknown, *lacking]))
-            found = estimated_gains(trials, joints, rig, tuple(self.gravity)) if lacking else {}
+            found = estimated_gains(trials, joints, rig, self.gravity) if lacking else {}
             for key in lacking:
                 values = {joint: float(f"{found[key][k]:.4g}") for k, joint in enumerate(joints)}
                 (nominal if key == "reflected_inertia" else said)[key] = values
         elif mode == "voltage":
-            said["kd"] = self._motor()[1]
-        else:
-            said["mode"] = "torque"
+            said["kd"] = self.controller.motor[1]
         return described(
             gravity=list(self.gravity), rate_hz=rate, joints=joints, controller=said, nominal=nominal, unknown=unknown,
             sensors={"read": self.read, "position_resolution": self.resolution},
         )  # fmt: skip
 
-    def _paths(self) -> list[Path]:
-        if isinstance(self.files, str):
-            raise InputError(f"source.files={self.files}: expected a list: 'source.files=[{self.files}]'")
-        found = []
-        for pattern in self.files:
-            matches = [Path(name) for name in sorted(glob(pattern, recursive=True))]
-            if not matches:
-                raise InputError(f"source.files: {pattern} matches no file{_beside(Path(pattern))}")
-            found += matches
-        if not found:
-            raise InputError("source.files: no file given")
-        return list(dict.fromkeys(found))
-
 
 def _each(make: Callable[[Log], list[Log]], logs: Sequence[Log], left: list[str]) -> list[Log]:
-    """What is made of each log; those of which nothing can be made are left out, unless that is all of them."""
     made: list[Log] = []
     for log in logs:
         try:
@@ -252,22 +256,18 @@ def _each(make: Callable[[Log], list[Log]], logs: Sequence[Log], left: list[str]
 
 
 def _checked(log: Log, columns: ColumnMap) -> Log:
-    """The log without equal rows.
-
-    Raises:
-        InputError: it lacks a column, or has words in one.
-    """
     for name in columns.names:
         if name not in log.table:
             raise InputError(f"{log.path}: column '{name}' is missing; the columns of numbers are {list(log.table)}")
         if name in log.wrong:
             row, word = log.wrong[name]
             raise InputError(f"{log.path}: column '{name}', row {row}: expected a number, not '{word}'")
+        if np.isnan(log.table[name]).all():
+            raise InputError(f"{log.path}: column '{name}' has no number in any row; name another in source.columns")
     return without_equal_rows(log, columns)
 
 
 def _label(log: Log, column: str) -> str:
-    """A column's name with the unit that stands below it."""
     return f"{column} [{log.units[column]}]" if column in log.units else column
 
 
@@ -292,6 +292,13 @@ def _trial(log: Log, columns: ColumnMap, units: Units, second: float, rate: floa
     return TrialTable(entry, time, origin=log.path, **values)
 
 
+def _begins_in_motion(trial: TrialTable) -> bool:
+    rows = max(1, int(np.searchsorted(trial.time, trial.time[0] + LOOK)))
+    way = np.abs(trial.position[rows:] - trial.position[:-rows])
+    long = trial.time[-1] - trial.time[0] > 4.0 * REMEMBERED
+    return bool(long and (way[0] > MOVING * np.sqrt(np.mean(way**2, axis=0))).any())
+
+
 def _doubts(
     units: Units, columns: ColumnMap, trials: Sequence[TrialTable], description: Description, rig: Rig
 ) -> Iterator[str]:
@@ -310,16 +317,16 @@ def _doubts(
                 open_.setdefault(unit.doubt, []).append(columns.joints[joint][signal])
     for doubt, names in open_.items():
         yield f"{', '.join(names)}: {doubt}"
-    for key in [key for key in description.unknown if key not in rig.unknown]:
-        begins = getattr(description.controller, key, description.nominal.get(key))
-        yield f"{key} is not stated: unknown, to be identified from {begins}, a guess"
+    if guesses := [key for key in description.unknown if key not in rig.unknown]:
+        begins = [getattr(description.controller, key, description.nominal.get(key)) for key in guesses]
+        said = "; ".join(f"{key} from {value}" for key, value in zip(guesses, begins, strict=True))
+        yield f"not stated, so unknown and to be identified, beginning with guesses: {said}"
     if description.controller.mode == "position":
         found = estimated_gains(trials, description.joints, rig, description.gravity)
         yield from gain_doubts(gains.kp, found, "kp" in description.unknown)
 
 
 def _steps(logs: Sequence[Log]) -> Iterator[tuple[str, str, str]]:
-    """What was done to the logs, each step once."""
     steps = list(dict.fromkeys(step for log in logs for step in log.steps))
     for what in dict.fromkeys(what for what, _ in steps):
         hows = [how for one, how in steps if one == what]
@@ -327,7 +334,6 @@ def _steps(logs: Sequence[Log]) -> Iterator[tuple[str, str, str]]:
 
 
 def _rows(columns: ColumnMap, units: Units, stamps: Unit | None, rate: float) -> Iterator[tuple[str, str, str]]:
-    """What was understood, for people: what, how, and what told it."""
     if stamps is not None:
         yield "time", f"{columns.time} [{stamps.name}], {rate:g} Hz", stamps.source
     for joint, entry in columns.joints.items():
@@ -337,7 +343,6 @@ def _rows(columns: ColumnMap, units: Units, stamps: Unit | None, rate: float) ->
 
 
 def _beside(pattern: Path) -> str:
-    """What there is where a pattern looks."""
     folder = pattern.parent
     if not folder.is_dir():
         return f"; there is no folder {folder}" if "*" not in str(folder) else ""
@@ -345,14 +350,7 @@ def _beside(pattern: Path) -> str:
     return f"; {folder} has {', '.join(names[:8]) or 'nothing'}{', ...' if len(names) > 8 else ''}"
 
 
-def _distinct(paths: list[Path]) -> list[str]:
-    """A name for each file; files of one name in several folders have the folder's before theirs."""
-    count = Counter(path.stem for path in paths)
-    names = [path.stem if count[path.stem] == 1 else f"{path.parent.name}_{path.stem}" for path in paths]
-    return [name if names.count(name) == 1 else f"{name}_{k}" for k, name in enumerate(names)]
-
-
-def _one_each(values: Iterable[Value] | None, logs: Sequence[str], key: str, default: list[Value]) -> list[Value]:
+def _one_each(values: Sequence[Value] | None, logs: Sequence[str], key: str, default: list[Value]) -> list[Value]:
     chosen = default if values is None else list(values)
     if len(chosen) != len(logs):
         raise InputError(f"source.{key}: {len(chosen)} values for {len(logs)} files; give one each")

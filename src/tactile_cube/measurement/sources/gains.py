@@ -63,23 +63,35 @@ def _motion(trial: TrialTable) -> Array:
     return np.stack([smooth, velocity, acceleration, error, trial.command[middle]], axis=1)
 
 
+def nonnegative_fit(columns: Mapping[str, Array], values: Array) -> tuple[dict[str, float], float]:
+    """Coefficients of columns (n,), none negative, and the error (2-norm) that they leave: inf of what is no number."""
+    table = np.stack(list(columns.values()), axis=1)
+    sizes = np.maximum(np.abs(table).max(axis=0), 1e-12)
+    if not np.isfinite(table / sizes).all() or not np.isfinite(values).all():
+        return dict.fromkeys(columns, 0.0), np.inf
+    found, left = nnls(table / sizes, values)
+    return dict(zip(columns, (found / sizes).tolist(), strict=True)), float(left)
+
+
+def resistance(v: Array) -> dict[str, Array]:
+    """Columns of what resists a velocity (n,) - damping, friction - and of a constant either way."""
+    sliding, ones = np.tanh(v / max(float(np.std(v)) / 5.0, 1e-9)), np.ones_like(v)
+    return {"damping": v, "friction": sliding, "up": ones, "down": -ones}
+
+
 @np.errstate(all="ignore")
 def _loop(error: Array, links: Array, v: Array, a: Array, inertia: float) -> tuple[float, float, float, float]:
-    sliding = np.tanh(v / max(float(np.std(v)) / 5.0, 1e-9))
-    columns = np.stack([links, a, v, sliding, np.ones_like(v), -np.ones_like(v)], axis=1)
-    sizes = np.maximum(np.abs(columns).max(axis=0), 1e-12)
-    if not np.isfinite(columns / sizes).all():
+    columns = {"rotor": a, **resistance(v)}
+    found, left = nonnegative_fit({"softness": links, **columns}, error)
+    if left == np.inf:
         return 1.0, 1.0, 1.0, 0.0
-    found, left = nnls(columns / sizes, error)
-    without = nnls(columns[:, 1:] / sizes[1:], error)[1]
-    softness, rotor, damping = (found / sizes)[:3]
+    softness, rotor, without = found["softness"], found["rotor"], nonnegative_fit(columns, error)[1]
     told = 1.0 - left / without if without > 0.0 and softness > 0.0 else 0.0
     if softness <= 0.0:
-        softness = (
-            rotor / inertia if rotor > 0.0 and inertia > 0.0 else float(np.std(error)) / max(float(np.std(links)), 1e-9)
-        )
+        known = rotor > 0.0 and inertia > 0.0
+        softness = rotor / inertia if known else float(np.std(error)) / max(float(np.std(links)), 1e-9)
     kp = 1.0 / max(softness, 1e-6)
-    return kp, kp * damping or 0.01 * kp, max(kp * rotor, NO_ROTOR * inertia, 1e-6), told
+    return kp, kp * found["damping"] or 0.01 * kp, max(kp * rotor, NO_ROTOR * inertia, 1e-6), told
 
 
 def gain_doubts(kp: Array, found: Mapping[str, Sequence[float]], unknown: bool) -> Iterator[str]:

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.rig import Rig, parse_rig
 from tactile_cube.measurement.recordings.writing import TrialTable
-from tactile_cube.measurement.sources.gains import motion_of
+from tactile_cube.measurement.sources.gains import motion_of, nonnegative_fit, resistance
 
 Array = NDArray[np.float64]
 ROBOTS = {
@@ -23,12 +22,9 @@ ROBOTS = {
 }
 LEVER = 0.1  # [m] from the axis to the mass, a guess
 UNIT_GAIN = 1.0  # [N m/rad] in the place of a gain that nobody states: everything else is in proportion to it
-OF_LINK = {
-    "pendulum": 0.5,
-    "wheel": 0.1,
-    "slide": 0.1,
-}  # part of the inertia that is the link's; the rest, free, is the rotor's
-HANGS = 0.7  # part of the squared error that must be left for another zero than that of the log
+OF_LINK = {"pendulum": 0.5, "wheel": 0.1, "slide": 0.1}
+"""Part of the inertia that is the link's; the rest, free, is the rotor's."""
+HANGS = 0.837  # part of the error that must be left for another zero than that of the log
 FEWEST = 20  # samples
 NO_WEIGHT = 0.02  # part of the drive's torque that a weight must be
 URDF = """<?xml version="1.0"?>
@@ -43,32 +39,18 @@ AXES = {"pendulum": "0 1 0", "wheel": "0 0 1", "slide": "1 0 0"}
 
 @dataclass(frozen=True)
 class Lever:
-    """What is known of such a joint.
+    """What is known of such a joint."""
 
-    Attributes:
-        robot: one of ROBOTS, also the joint's name.
-        mass: at the end of the lever, of a wheel that of its rim [kg]; None: not known.
-        lever: from the axis to the mass [m]; None: not known.
-    """
-
-    robot: str
-    mass: float | None = None
-    lever: float | None = None
+    robot: str  # one of ROBOTS, also the joint's name
+    mass: float | None = None  # at the end of the lever, of a wheel that of its rim [kg]
+    lever: float | None = None  # from the axis to the mass [m]
 
     def __post_init__(self) -> None:
-        """Refuse what no joint has.
-
-        Raises:
-            InputError: another robot, a mass or a lever that is not above 0.
-        """
+        """Refuse another robot."""
         if self.robot not in ROBOTS:
             raise InputError(
                 f"source.robot={self.robot}: unknown; choose one of {', '.join(ROBOTS)}, or give source.urdf"
             )
-        for key in ("mass", "lever"):
-            value = getattr(self, key)
-            if value is not None and not 0.0 < value < np.inf:
-                raise InputError(f"source.{key}={value:g}: give a finite number above 0, or leave it out")
 
     def rig(self, mass: float = 1.0, lever: float = LEVER, hangs_at: float = 0.0) -> Rig:
         """Return it as a mechanism; of a pendulum that hangs down at an angle [rad]."""
@@ -80,18 +62,11 @@ class Lever:
         return parse_rig(text, Path(f"{self.robot}.urdf"))
 
     def sized(self, trials: Sequence[TrialTable], mode: str, kp: float | None, gravity: float) -> Rig:
-        """Return it with the masses that logs show, and what stays unknown.
-
-        Args:
-            trials: of this joint alone.
-            mode: of the controller; `free` without a torque.
-            kp: of a position controller [N m/rad]; None: not known.
-            gravity: [m/s^2].
-        """
+        """Return it with the masses that logs of this joint show under gravity [m/s^2], and what stays unknown."""
         found = _seen(trials, mode, self.robot == "pendulum", kp or UNIT_GAIN)
         if self.mass is not None:
             rig = self.rig(self.mass, self.lever or LEVER, found.hangs_at)
-            return replace(rig, doubts=self._doubts(found, "", mode))
+            return replace(rig, doubts=self._doubts(found, ""))
         inertia = max(found.inertia, 1e-9 * (kp or UNIT_GAIN))
         mass, lever = self._link(found, inertia, gravity)
         scale = 1.0 / mass if mode == "free" else 1.0
@@ -104,13 +79,12 @@ class Lever:
             guessed |= {"kd": max(found.damping, 0.01 * (kp or UNIT_GAIN))}
             guessed |= {} if kp else {"kp": UNIT_GAIN}
             unknown.append("kd")
-        told = {
-            "free": "no torque is known",
-            "position": "" if kp else f"kp is not stated, {UNIT_GAIN:g} N m/rad is a guess",
-        }
+        open_ = "no torque is known" if mode == "free" else ""
+        if mode == "position" and not kp:
+            open_ = f"kp is not stated, {UNIT_GAIN:g} N m/rad is a guess"
         stated = {key: {self.robot: float(f"{value:.4g}")} for key, value in guessed.items()}
         rig = self.rig(mass * scale, lever, found.hangs_at)
-        doubts = self._doubts(found, told.get(mode, ""), mode)
+        doubts = self._doubts(found, open_)
         return replace(rig, stated=stated, stated_by="the log", unknown=tuple(unknown), doubts=doubts)
 
     def _link(self, found: _Seen, inertia: float, gravity: float) -> tuple[float, float]:
@@ -124,38 +98,25 @@ class Lever:
         lever = self.lever or min(LEVER, own * gravity / found.weight)
         return found.weight / (gravity * lever), lever
 
-    def _doubts(self, found: _Seen, scale: str, mode: str) -> tuple[str, ...]:
-        lines = []
-        if self.mass is None:
-            lines.append(
-                f"no URDF: mass, lever and rotor of the {self.robot} are guesses from the log, and are identified"
-            )
-        if scale:
-            lines.append(f"{scale}: of torques, gains and inertias only the ratios are known")
-        if self.robot == "pendulum" and found.weight <= NO_WEIGHT * found.drive:
-            lines.append("the log shows no weight: is it a wheel (source.robot=wheel)?")
-        if found.hangs_at:
-            lines.append(f"by the log the pendulum hangs down at {found.hangs_at:.3g} rad, not at 0")
-        return tuple(lines)
+    def _doubts(self, found: _Seen, scale: str) -> tuple[str, ...]:
+        guessed = f"no URDF: mass, lever and rotor of the {self.robot} are guesses from the log, and are identified"
+        light = self.robot == "pendulum" and found.weight <= NO_WEIGHT * found.drive
+        lines = {
+            guessed: self.mass is None,
+            f"{scale}: of torques, gains and inertias only the ratios are known": scale,
+            "the log shows no weight: is it a wheel (source.robot=wheel)?": light,
+            f"by the log the pendulum hangs down at {found.hangs_at:.3g} rad, not at 0": found.hangs_at,
+        }
+        return tuple(line for line, holds in lines.items() if holds)
 
 
 @dataclass(frozen=True)
 class _Seen:
-    """What logs show of a joint.
-
-    Attributes:
-        inertia: [kg m^2].
-        weight: m g l [N m].
-        damping: [N m s/rad].
-        hangs_at: angle at which a pendulum hangs down [rad].
-        drive: usual torque [N m].
-    """
-
-    inertia: float = 0.0
-    weight: float = 0.0
-    damping: float = 0.0
-    hangs_at: float = 0.0
-    drive: float = 0.0
+    inertia: float = 0.0  # [kg m^2]
+    weight: float = 0.0  # m g l [N m]
+    damping: float = 0.0  # [N m s/rad]
+    hangs_at: float = 0.0  # angle at which a pendulum hangs down [rad]
+    drive: float = 0.0  # usual torque [N m]
 
 
 def _seen(trials: Sequence[TrialTable], mode: str, weighs: bool, kp: float) -> _Seen:
@@ -165,25 +126,12 @@ def _seen(trials: Sequence[TrialTable], mode: str, weighs: bool, kp: float) -> _
         return _Seen()
     q, v, a, error, command = motion[:, :, 0].T
     drive = {"position": kp * error, "free": -a}.get(mode, command)
-    ones, sliding = np.ones_like(q), np.tanh(v / max(float(np.std(v)) / 5.0, 1e-9))
-    columns = {"damping": v, "friction": sliding, "up": ones, "down": -ones}
-    columns |= {} if mode == "free" else {"inertia": a}
-    columns |= {"sin": np.sin(q)} if weighs else {}
-    found, left = _least_squares(columns, drive)
+    columns = resistance(v) | ({} if mode == "free" else {"inertia": a}) | ({"sin": np.sin(q)} if weighs else {})
+    found, left = nonnegative_fit(columns, drive)
     if weighs:
-        turned, rest = _least_squares(columns | {"cos": np.cos(q), "anti": -np.cos(q)}, drive)
+        turned, rest = nonnegative_fit(columns | {"cos": np.cos(q), "anti": -np.cos(q)}, drive)
         found = turned if rest < HANGS * left else found
     across = found.get("cos", 0.0) - found.get("anti", 0.0)
     weight, along = float(np.hypot(found.get("sin", 0.0), across)), found.get("sin", 0.0)
     hangs_at = float(round(-np.arctan2(across, along), 3)) if across else 0.0
     return _Seen(found.get("inertia", 1.0), weight, found["damping"], hangs_at, float(np.std(drive)))
-
-
-def _least_squares(columns: Mapping[str, Array], values: Array) -> tuple[dict[str, float], float]:
-    """Coefficients that are not negative, and the squared error that they leave."""
-    table = np.stack(list(columns.values()), axis=1)
-    sizes = np.maximum(np.abs(table).max(axis=0), 1e-12)
-    if not np.isfinite(table / sizes).all() or not np.isfinite(values).all():
-        return dict.fromkeys(columns, 0.0), np.inf
-    found, left = nnls(table / sizes, values)
-    return dict(zip(columns, (found / sizes).tolist(), strict=True)), float(left) ** 2

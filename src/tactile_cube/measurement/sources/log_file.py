@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tactile_cube import limits
 from tactile_cube.errors import InputError
-from tactile_cube.measurement.recordings.tables import CSV, Dialect, Table, read_frame, unknown_ending
+from tactile_cube.measurement.recordings.tables import CSV, Table, read_frame, unknown_ending
 from tactile_cube.measurement.sources.column_map import time_of
 from tactile_cube.untrusted_file import below, read_npz, read_text, regular
 
@@ -31,27 +31,16 @@ DAY, YEAR = 86400.0, 3.15e7  # [s]; dates count from 1970
 
 @dataclass(frozen=True)
 class Log:
-    """What a file holds.
-
-    Attributes:
-        path: of the file.
-        table: column -> numbers (n,), nan where there is none.
-        texts: column -> words (n,), of columns of words.
-        wrong: column of numbers -> row and text of the first word in it.
-        units: column -> unit, as a row of units says.
-        steps: what was done to it.
-        name: of the trial.
-        whole: of the log that the trial was cut from.
-    """
+    """What a file holds: columns (n,) by name."""
 
     path: Path
-    table: Table
-    texts: Mapping[str, NDArray[Any]] = field(default_factory=dict)
-    wrong: Mapping[str, tuple[int, str]] = field(default_factory=dict)
-    units: Mapping[str, str] = field(default_factory=dict)
+    table: Table  # of numbers, nan where there is none
+    texts: Mapping[str, NDArray[Any]] = field(default_factory=dict)  # of words
+    wrong: Mapping[str, tuple[int, str]] = field(default_factory=dict)  # row and text of the first word among numbers
+    units: Mapping[str, str] = field(default_factory=dict)  # as a row of units says
     steps: tuple[Step, ...] = ()
-    name: str = ""
-    whole: str = ""
+    name: str = ""  # of the trial
+    whole: str = ""  # name of the log that the trial was cut from
 
     def rows(self, rows: NDArray[Any], *steps: Step, name: str | None = None) -> "Log":
         """These rows of it alone (a mask or indices)."""
@@ -67,7 +56,12 @@ def read_logs(path: Path) -> list[Log]:
         InputError: a missing, truncated or too large file, or one that is not read.
     """
     if path.is_dir():
-        return [read_logs(file)[0] for file in _lerobot_files(path)]
+        if not (path / LEROBOT).is_file():
+            raise InputError(f"{path}: a folder, and no LeRobot data set (no meta/info.json); name its files: {path}/*")
+        files = [below(path, str(one.relative_to(path)), str(path)) for one in path.glob("data/**/*.parquet")]
+        if not files:
+            raise InputError(f"{path}: a LeRobot data set without data/**/*.parquet; fetch its data")
+        return [read_logs(file)[0] for file in sorted(files)]
     suffix = path.suffix.lower()
     if suffix not in READERS:
         raise unknown_ending(path, f"{', '.join(READERS)}, or the folder of a LeRobot data set")
@@ -78,7 +72,13 @@ def _frame_log(path: Path) -> Log:
     frame, dialect = read_frame(path)
     names = _lerobot_names(path)
     columns: dict[str, Any] = {}
-    steps = list(_dialect_steps(dialect))
+    steps: list[Step] = []
+    if dialect is not None and dialect.preamble:
+        steps.append(("preamble", f"{dialect.preamble} lines above the header are left out"))
+    if dialect is not None and dialect.units:
+        steps.append(("row of units", ", ".join(f"{name} [{unit}]" for name, unit in dialect.units.items())))
+    if dialect is not None and dialect.encoding != "utf-8-sig":
+        steps.append(("encoding", dialect.encoding))
     for name in frame.columns:
         column = frame[name]
         if isinstance(column.dtype, polars.List | polars.Array):
@@ -88,17 +88,6 @@ def _frame_log(path: Path) -> Log:
         else:
             columns[name] = column
     return _log(path, columns, steps, dialect.units if dialect is not None else {})
-
-
-def _dialect_steps(dialect: Dialect | None) -> Iterator[Step]:
-    if dialect is None:
-        return
-    if dialect.preamble:
-        yield "preamble", f"{dialect.preamble} lines above the header are left out"
-    if dialect.units:
-        yield "row of units", ", ".join(f"{name} [{unit}]" for name, unit in dialect.units.items())
-    if dialect.encoding != "utf-8-sig":
-        yield "encoding", dialect.encoding
 
 
 def _stacked(column: polars.Series) -> NDArray[Any]:
@@ -138,7 +127,8 @@ def _log(path: Path, columns: Mapping[str, Any], steps: list[Step], units: Mappi
             words_in = (column.is_null() & ~told.str.to_lowercase().is_in(MISSING)).arg_true()
             wrong |= {name: (int(words_in[0]), told[int(words_in[0])])} if len(words_in) else {}
         if column.dtype.is_temporal():
-            column = column.cast(polars.Int64) * 1e-6 if name in clocks else _seconds(column)
+            column = column if name in clocks else column.cast(polars.Datetime("us"))
+            column = column.cast(polars.Int64) * 1e-6
         if column.dtype.is_numeric() or column.dtype in (polars.Boolean, polars.Null):
             table[name] = column.cast(polars.Float64).fill_null(float("nan")).to_numpy()
         elif column.dtype == polars.String:
@@ -168,10 +158,6 @@ def _told(column: polars.Series) -> polars.Series:
         return column.str.to_datetime(time_unit="us", time_zone="UTC", strict=True)
     except polars.exceptions.PolarsError:
         return column
-
-
-def _seconds(column: polars.Series) -> polars.Series:
-    return column.cast(polars.Datetime("us")).cast(polars.Int64) * 1e-6
 
 
 def _arrays_log(path: Path, arrays: Mapping[str, NDArray[Any]]) -> Log:
@@ -204,7 +190,6 @@ def _arrays_log(path: Path, arrays: Mapping[str, NDArray[Any]]) -> Log:
 
 
 def _mat(path: Path) -> Log:
-    """A MATLAB file of version 5 to 7; structures become `name.field`."""
     from scipy.io import loadmat  # imports slowly
 
     with path.open("rb") as stream:
@@ -220,7 +205,6 @@ def _mat(path: Path) -> Log:
 
 
 def _require_small(path: Path) -> None:
-    """Refuse a MATLAB file that unpacks to too much: compressed elements say nothing of their size."""
     left, content = 8 * limits.NUMBERS, path.read_bytes()
     order: Literal["little", "big"] = "little" if content[126:128] == b"IM" else "big"
     place = 128
@@ -240,7 +224,6 @@ def _require_small(path: Path) -> None:
 
 
 def _json(path: Path) -> Log:
-    """A list of rows, such as BAM and K-Scale write it, or an object of columns."""
     regular(path, limits.CHUNK)
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
@@ -276,18 +259,7 @@ def _scalars(row: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, An
         yield from _scalars(one, f"{prefix}{name}.") if isinstance(one, dict) else [(f"{prefix}{name}", one)]
 
 
-def _lerobot_files(folder: Path) -> list[Path]:
-    """The tables of a LeRobot data set (version 2 or 3)."""
-    if not (folder / LEROBOT).is_file():
-        raise InputError(f"{folder}: a folder, and no LeRobot data set (no meta/info.json); name its files: {folder}/*")
-    files = [below(folder, str(one.relative_to(folder)), str(folder)) for one in folder.glob("data/**/*.parquet")]
-    if not files:
-        raise InputError(f"{folder}: a LeRobot data set without data/**/*.parquet; fetch its data")
-    return sorted(files)
-
-
 def _lerobot_names(path: Path) -> dict[str, list[str]]:
-    """What meta/info.json beside a table calls the numbers of its lists."""
     places = [path.parent, *path.parents[2:3]]
     info = next((place / LEROBOT for place in places if (place / LEROBOT).is_file()), None)
     if info is None or path.suffix.lower() != ".parquet":

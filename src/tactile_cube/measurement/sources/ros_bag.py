@@ -1,20 +1,25 @@
 """A ROS 2 bag in MCAP (joint states and commands) as a recording; needs the extra `ros`, but no ROS."""
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, BinaryIO, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube import limits
 from tactile_cube.errors import InputError
-from tactile_cube.measurement.recordings.description import PerJoint, TrialEntry
+from tactile_cube.measurement.recordings.description import PerJoint, Rate, TrialEntry
 from tactile_cube.measurement.recordings.rig import read_rig
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
-from tactile_cube.measurement.sources.source import described, rate_of, with_stated
+from tactile_cube.measurement.sources.source import described, listed, rate_of, with_stated
 from tactile_cube.untrusted_file import regular
+
+if TYPE_CHECKING:
+    from mcap.records import Chunk
 
 Array = NDArray[np.float64]
 SAME_STAMP = 1e-6  # [s]
@@ -27,21 +32,21 @@ class RosBag:
     Efforts of the joint states become torques. A Float64MultiArray of commands is in the order of `joints`.
     """
 
-    files: Iterable[str]
+    files: str | Sequence[str]
     urdf: str
-    joints: Iterable[str]
+    joints: Sequence[str]
     controller: Mapping[str, PerJoint | None]
     states: str
     commands: str
     nominal: Mapping[str, PerJoint | None]
-    gravity: Iterable[float]
-    rate: float | None
-    read: str
+    gravity: tuple[float, float, float]
+    rate: Rate | None
+    read: Literal["before", "after"]
 
     def recordings(self, seed: int) -> dict[str, RecordingTables]:
         """One recording of all bags."""
         rig, joints = read_rig(Path(self.urdf)), list(self.joints)
-        tables = [self._trial(Path(name), joints) for name in self.files]
+        tables = [self._trial(Path(name), joints) for name in listed(self.files)]
         rate = self.rate if self.rate is not None else rate_of(tables[0].time, 2, str(tables[0].entry.note))
         description = described(
             gravity=list(self.gravity), rate_hz=rate, joints=joints, sensors={"read": self.read},
@@ -66,20 +71,18 @@ class RosBag:
 
 
 def _messages(path: Path, topics: tuple[str, str]) -> dict[str, list[tuple[float, Any]]]:
-    """Topic -> (time [s], message); the header's stamp where a message has one, else when it was logged."""
-    try:
-        from tactile_cube.measurement.sources.mcap_file import decoded_messages
-    except ImportError:
-        raise InputError("source=mcap needs the optional extra: pip install 'tactile-cube[ros]'") from None
+    """Topic -> (time [s], message)."""
     found: dict[str, list[tuple[float, Any]]] = {topic: [] for topic in topics}
     try:
         with regular(path).open("rb") as stream:
-            for number, (topic, log_time, message) in enumerate(decoded_messages(stream, topics)):
+            for number, (topic, seconds, message) in enumerate(_decoded(stream, topics)):
                 if number == limits.MESSAGES:
                     raise InputError(f"{path}: more than {number} messages on {' and '.join(topics)}; split the bag")
-                found[topic].append((_stamp(message, log_time), message))
+                found[topic].append((seconds, message))
     except InputError:
         raise
+    except ImportError:
+        raise InputError("source=mcap needs the optional extra: pip install 'tactile-cube[ros]'") from None
     except Exception as error:  # decoder and decompressors raise a dozen kinds for damaged files
         reason = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"{path}: not a complete MCAP file: {reason}") from None
@@ -91,15 +94,51 @@ def _messages(path: Path, topics: tuple[str, str]) -> dict[str, list[tuple[float
     return {topic: sorted(messages, key=lambda one: one[0]) for topic, messages in found.items()}
 
 
-def _stamp(message: Any, log_time: int) -> float:
-    header = getattr(message, "header", None)
-    if header is not None and (header.stamp.sec or header.stamp.nanosec):
-        return float(header.stamp.sec) + 1e-9 * float(header.stamp.nanosec)
-    return 1e-9 * log_time
+def _decoded(stream: BinaryIO, topics: Sequence[str]) -> Iterator[tuple[str, float, Any]]:
+    """Topic, time [s] by the header's stamp where there is one, else of logging, and content of ROS 2 messages."""
+    from mcap.records import Channel, Chunk, Message, Schema
+    from mcap.stream_reader import StreamReader, breakup_chunk
+    from mcap_ros2.decoder import DecoderFactory
+
+    factory, schemas, decoders = DecoderFactory(), {}, {}
+    whole = StreamReader(stream, emit_chunks=True, record_size_limit=limits.CHUNK).records
+    for record in (
+        one for part in whole for one in (breakup_chunk(unpacked(part)) if isinstance(part, Chunk) else [part])
+    ):
+        if isinstance(record, Schema):
+            schemas[record.id] = record
+        elif isinstance(record, Channel) and record.topic in topics:
+            decode = factory.decoder_for(record.message_encoding, schemas.get(record.schema_id))
+            if decode is None:
+                raise ValueError(f"messages on '{record.topic}' are no ROS 2 messages ({record.message_encoding})")
+            decoders[record.id] = record.topic, decode
+        elif isinstance(record, Message) and record.channel_id in decoders:
+            topic, decode = decoders[record.channel_id]
+            message = decode(record.data)
+            stamp = getattr(getattr(message, "header", None), "stamp", None)
+            seconds = 0.0 if stamp is None else float(stamp.sec) + 1e-9 * float(stamp.nanosec)
+            yield topic, seconds or 1e-9 * record.log_time, message
+
+
+def unpacked(chunk: Chunk) -> Chunk:
+    """Return a chunk as it was before it was compressed; a ValueError if larger than it says, or `limits.CHUNK`."""
+    import lz4.frame
+    import zstandard
+
+    size = chunk.uncompressed_size
+    if size > limits.CHUNK:
+        raise ValueError(f"a chunk of {size / 1e6:.4g} MB; chunks up to {limits.CHUNK / 1e6:g} MB are read")
+    data = chunk.data
+    if chunk.compression == "zstd":
+        data = zstandard.ZstdDecompressor().stream_reader(data).read(size + 1)
+    elif chunk.compression == "lz4":
+        data = lz4.frame.LZ4FrameDecompressor().decompress(data, size + 1)
+    if len(data) != size:
+        raise ValueError(f"a chunk is not of the {size} bytes that it says")
+    return replace(chunk, compression="", data=data)
 
 
 def _by_joint(message: Any, joints: list[str], path: Path, signal: str) -> Array:
-    """Positions in the order of `joints`."""
     if hasattr(message, "points"):
         names, values = message.joint_names, message.points[0].positions
     elif hasattr(message, "position"):

@@ -10,7 +10,7 @@ Source: paper, section II-D: lateral and spinning friction from the torque neede
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -29,7 +29,7 @@ from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTa
 from tactile_cube.measurement.replay.hand_replay import ContactModel, HandReplay, to_hand
 from tactile_cube.measurement.replay.model import Model, terms_of
 from tactile_cube.measurement.replay.simulator import Simulator
-from tactile_cube.measurement.sources.session import SimulatedSession, silent_trial, unmeasured
+from tactile_cube.measurement.sources.simulated_rig import SimulatedSession, silent_trial, unmeasured
 from tactile_cube.simulation.contact_effects import find_any_effect, is_contact_effect
 from tactile_cube.simulation.engine import EngineName
 
@@ -43,14 +43,14 @@ HOLDING = {"hold": (0, 1, 2, 3), "twist": (1, 3)}  # fingers; middle and thumb o
 class SimulatedGrasp(SimulatedSession):
     """Simulates the bench tests of friction."""
 
-    kinds: Iterable[str] = ("hold", "twist")
+    kinds: Sequence[str] = ("hold", "twist")
     initialisations: int = 4
     duration: float = 8.0
     rate: float = 100.0
     step: float = 0.001
     size: float = 0.08
-    weights: Iterable[float] = (0.15, 0.25)
-    levers: Iterable[float] = (0.02, 0.06, 0.15)
+    weights: Sequence[float] = (0.15, 0.25)
+    levers: Sequence[float] = (0.02, 0.06, 0.15)
     lever_weight: float = 0.1
     placing: float = 0.001
     squeeze: float = 0.02
@@ -98,8 +98,6 @@ class SimulatedGrasp(SimulatedSession):
 
 @dataclass(frozen=True)
 class _Session:
-    """One hand with its true constants, its sensors, and somebody who puts the box in its place."""
-
     settings: SimulatedGrasp
     free: Simulator
     loaded: HandReplay
@@ -132,7 +130,6 @@ class _Session:
         return tables
 
     def _played(self, entry: TrialEntry, grasp: Grasp, offset: Array) -> TrialTable:
-        """Simulate one trial and log it as the sensors would."""
         s, command, recording = self.settings, self._command(entry.kind), self.loaded.recording
         assert recording.description.object is not None
         load = load_of(recording.description.object, grasp)

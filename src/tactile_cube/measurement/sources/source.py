@@ -1,8 +1,8 @@
 """What every source of recordings gives."""
 
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, fields
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import fields
 from functools import cache
 from typing import Any, Protocol, TypeVar
 
@@ -10,6 +10,7 @@ import numpy as np
 from hydra.utils import get_class
 from numpy.typing import NDArray
 from omegaconf import OmegaConf
+from pydantic import TypeAdapter, ValidationError
 
 from tactile_cube.composition import CONFIG, composed, suggestion
 from tactile_cube.errors import InputError
@@ -46,16 +47,20 @@ def with_stated(
     return of_file | {key: value for key, value in known(said).items() if value != float("inf") or key not in of_file}
 
 
+def listed(files: str | Iterable[str]) -> list[str]:
+    """One file or several as a list."""
+    return [files] if isinstance(files, str) else [str(one) for one in files]
+
+
 REGULAR = 0.1  # part of a step by which those of a log at one rate differ
 HIDDEN = 0.01  # of a step: what the last row of a log may be off by a rounded rate
 
 
 def rate_of(time: NDArray[np.float64], digits: int, where: str) -> float:
-    """Samples per second of rows at times (samples,) [s] of the file `where`.
+    """Samples per second of rows at times (samples,) [s] of the file `where`, rounded to digits if no row shows it.
 
     Where the steps are regular, their number over the whole time: a clock that counts from 1970 tells a step of some
-    milliseconds to 0.2 us only. Else the median's, for a log with pauses has no other. Rounded to so many digits if no
-    row shows it.
+    milliseconds to 0.2 us only. Else the median's, for a log with pauses has no other.
 
     Raises:
         InputError: time does not go forward.
@@ -74,10 +79,7 @@ def rate_of(time: NDArray[np.float64], digits: int, where: str) -> float:
 
 
 def source_settings(option: str, given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the settings of `record source=OPTION` with others in their place, those of mappings key by key.
-
-    For programs: what is given may be the words of strangers' files, and no configuration interprets them.
-    """
+    """Return the settings of `record source=OPTION` with others in their place, which no configuration interprets."""
     settings = dict(_shipped(option))
     for key, value in given.items():
         old = settings.get(key)
@@ -99,25 +101,34 @@ def recording_tables(settings: Mapping[str, Any], option: str, seed: int) -> dic
         seed: of simulated ones.
 
     Raises:
-        InputError: settings that are missing or that the source does not have, and what the source itself refuses.
+        InputError: settings that are missing, of another type or that the source does not have, and what the source
+            itself refuses.
     """
     source = get_class(settings["_target_"])
-    given = {key: value for key, value in settings.items() if key != "_target_"}
-    known = {one.name: one.default is MISSING and one.default_factory is MISSING for one in fields(source)}
-    for key in given.keys() - known:
+    given = {key: value for key, value in settings.items() if key != "_target_" and value != "???"}
+    known = [one.name for one in fields(source)]
+    for key in given.keys() - set(known):
         raise InputError(f"source.{key}: source={option} has no such setting{suggestion(key, known)}")
-    _require([key for key, needed in known.items() if given.get(key, "???" if needed else None) == "???"], option)
-    made: dict[str, RecordingTables] = source(**given).recordings(seed)
-    return made
+    try:
+        checked: Source = TypeAdapter(source).validate_python(given)
+    except ValidationError as error:
+        missing = [str(one["loc"][0]) for one in error.errors() if one["type"] == "missing"]
+        if missing:
+            text = (CONFIG / "source" / f"{option}.yaml").read_text(encoding="utf-8")
+            said = dict(re.findall(r"^ *(\w+): \?\?\? *# *(.*)$", text, re.MULTILINE))
+            needs = [f"source.{key}=..." + (f" ({said[key]})" if key in said else "") for key in missing]
+            raise InputError(f"source={option} needs {'; '.join(needs)}") from None
+        raise InputError(_refused(error, given)) from None
+    return checked.recordings(seed)
 
 
-def _require(missing: Sequence[str], option: str) -> None:
-    """Refuse a source without its mandatory settings, naming all of them and what its file says of each."""
-    if missing:
-        text = (CONFIG / "source" / f"{option}.yaml").read_text(encoding="utf-8")
-        found = [re.search(rf"^ *{key}: \?\?\? *# *(.*)$", text, re.MULTILINE) for key in missing]
-        said = [
-            f"source.{key}=..." + (f" ({meaning[1]})" if meaning else "")
-            for key, meaning in zip(missing, found, strict=True)
-        ]
-        raise InputError(f"source={option} needs {'; '.join(said)}")
+def _refused(error: ValidationError, given: Mapping[str, Any]) -> str:
+    first = error.errors()[0]
+    place: Any = given
+    keys: list[str] = []
+    for part in first["loc"]:  # behind the keys stand alternatives of a type
+        if not isinstance(place, Mapping) or part not in place:
+            break
+        place, keys = place[part], [*keys, str(part)]
+    said = str(first["msg"]).removeprefix("Input should be ")
+    return f"source.{'.'.join(keys)}={place}: expected {said}"

@@ -58,7 +58,6 @@ def joined(logs: Sequence[Log], whole: Callable[[Sequence[str]], bool]) -> list[
 
 
 def _beside(one: Log, other: Log) -> bool:
-    """Whether they have columns of their own, and a column of time in common that shows the same time."""
     shared = set(one.table) & set(other.table)
     time = time_of(list(one.table))
     if time is None or shared != {time}:
@@ -70,7 +69,8 @@ def _beside(one: Log, other: Log) -> bool:
 def _merged(logs: Sequence[Log]) -> Log:
     name = str(time_of(list(logs[0].table)))
     times = [log.table[name] for log in logs]
-    alike = all(len(one) == len(times[0]) and _one_to_one(one, times[0]) for one in times)
+    half = 0.5 * np.median(np.diff(times[0]))  # a period: within it are the stamps of two files of one loop
+    alike = all(len(one) == len(times[0]) and np.abs(one - times[0]).max() < half for one in times)
     time = times[0] if alike else np.unique(np.concatenate(times))
     table: Table = {name: time}
     for log in logs:
@@ -86,11 +86,6 @@ def _merged(logs: Sequence[Log]) -> Log:
     return Log(logs[0].path, table, {}, wrong, units, steps, logs[0].name)
 
 
-def _one_to_one(one: Array, other: Array) -> bool:
-    """Whether rows are stamped within half a period of each other's, as two files of one loop are."""
-    return bool(np.abs(one - other).max() < 0.5 * np.median(np.diff(other)))
-
-
 def without_equal_rows(log: Log, columns: ColumnMap) -> Log:
     """The log without rows that say again what the row before them says, time included."""
     if columns.time is None or len(log.table[columns.time]) < 2:
@@ -104,10 +99,10 @@ def without_equal_rows(log: Log, columns: ColumnMap) -> Log:
 
 
 def trials_of(log: Log, columns: ColumnMap, second: float, free: bool) -> list[Log]:
-    """The trials in a log: one an episode, cut where time starts again or has a gap, and torque is switched.
+    """The trials in a log without equal rows: cut at episodes, restarts and gaps of time, and where torque is switched.
 
     Args:
-        log: without equal rows.
+        log: of one file.
         columns: which are used.
         second: size of the unit of time [s].
         free: trials without torque are wanted, and not those with it.
@@ -137,11 +132,7 @@ def trials_of(log: Log, columns: ColumnMap, second: float, free: bool) -> list[L
 
 
 def _restarts(log: Log, columns: ColumnMap, second: float, labels: Sequence[str], most: float) -> Mask:
-    """Where time goes back by more than `most` [s] to where it began (n - 1,).
-
-    Raises:
-        InputError: it goes back to somewhere else, or for a few rows: they are in disorder.
-    """
+    """Where time goes back by more than `most` [s] to where it began (n - 1,); anywhere else rows are in disorder."""
     time = log.table[str(columns.time)] * second
     steps = np.diff(time)
     back = (steps < -most) & ~_differ(labels, len(steps))
@@ -159,7 +150,6 @@ def _restarts(log: Log, columns: ColumnMap, second: float, labels: Sequence[str]
 
 
 def _measured(log: Log, columns: ColumnMap) -> list[str]:
-    """The columns of signals that have any number."""
     return [name for name in columns.names if name in log.table and not np.isnan(log.table[name]).all()]
 
 
@@ -178,7 +168,6 @@ def _differ(labels: Sequence[str], count: int) -> Mask:
 
 
 def _episodes(log: Log) -> tuple[Sequence[str], str]:
-    """What a column of episodes says row by row, and how it is told."""
     for name in (*log.table, *log.texts):
         said = set(words(name))
         if not (said & EPISODE and said <= EPISODE | COUNTED):
@@ -216,10 +205,14 @@ def _on_one_time(log: Log, columns: ColumnMap) -> Log:
 
 
 def _gaps_out(log: Log, columns: ColumnMap, second: float, free: bool) -> Iterator[Log]:
-    """Pieces between gaps of time, of rows in which torque is on (or off where a free swing is wanted)."""
     steps = np.diff(log.table[str(columns.time)]) * second
     far = steps > LONGEST_GAP if len(steps) and np.median(steps) <= LONGEST_GAP else np.zeros(len(steps), dtype=bool)
-    on = _torque_on(log, columns)
+    switches = [
+        values > 0.5
+        for name, values in log.table.items()
+        if SWITCH & set(words(name)) and name not in columns.names and set(np.unique(values)) == {0.0, 1.0}
+    ]
+    on = np.logical_and.reduce(switches) if switches else None
     wanted = np.ones(len(steps) + 1, dtype=bool) if on is None else on != free
     if on is not None and not wanted.all():
         other = "with" if free else "without"
@@ -232,13 +225,3 @@ def _gaps_out(log: Log, columns: ColumnMap, second: float, free: bool) -> Iterat
     for piece in _cut(marks, far | (wanted[1:] != wanted[:-1]), (), longest):
         if piece.table.pop("").all():
             yield piece
-
-
-def _torque_on(log: Log, columns: ColumnMap) -> Mask | None:
-    """Where torque is on, by columns of 0 and 1 such as `torque_enable`; None where none says so."""
-    switches = [
-        values > 0.5
-        for name, values in log.table.items()
-        if SWITCH & set(words(name)) and name not in columns.names and set(np.unique(values)) == {0.0, 1.0}
-    ]
-    return np.logical_and.reduce(switches) if switches else None

@@ -53,28 +53,14 @@ def of_motor(name: str) -> bool:
     return bool({"motor", "mot", "rotor"} & set(words(name)))
 
 
-def _unit_of(name: str, allowed: Mapping[str, float]) -> str | None:
-    """The unit, one of those allowed, that the name ends with or has in brackets."""
-    torque = TORQUE_UNIT.search(name)
-    if torque is not None and set(allowed) & set(TORQUE_PREFIX.values()):
-        return TORQUE_PREFIX[(torque.group(1) or torque.group(2) or "").lower()]
-    if "°" in name and "deg" in allowed:
-        return "deg"
-    for word in reversed(words(name)[1:] or words(name)):
-        for unit in allowed:
-            if word in UNITS.get(unit, ()):
-                return unit
-    return None
-
-
 @dataclass(frozen=True)
 class Unit:
-    """A unit: its name, its size in SI units, what told it, and the reading that is zero."""
+    """The unit of a column."""
 
     name: str
-    size: float
-    source: str
-    zero: float = 0.0
+    size: float  # in SI units
+    source: str  # what told it
+    zero: float = 0.0  # the reading that is zero
     doubt: str = ""  # what nothing proves
 
     @property
@@ -95,10 +81,21 @@ def chosen_unit(said: str | int | None, name: str, units: Mapping[str, float], k
     """
     if said is not None:
         if said not in units:
-            raise InputError(f"source.{key}={said}: unknown; choose one of {', '.join(units)}")
+            others = f", {RANGE} (LeRobot's -100 .. 100) or the ticks of a turn" if key == "angle_unit" else ""
+            raise InputError(f"source.{key}={said}: unknown; choose one of {', '.join(units)}{others}")
         return Unit(str(said), units[str(said)], f"source.{key}")
-    found = _unit_of(name, units)
+    found = _named(name, units)
     return None if found is None else Unit(found, units[found], "its name")
+
+
+def _named(name: str, allowed: Mapping[str, float]) -> str | None:
+    torque = TORQUE_UNIT.search(name)
+    if torque is not None and set(allowed) & set(TORQUE_PREFIX.values()):
+        return TORQUE_PREFIX[(torque.group(1) or torque.group(2) or "").lower()]
+    if "°" in name and "deg" in allowed:
+        return "deg"
+    said = reversed(words(name)[1:] or words(name))
+    return next((unit for word in said for unit in allowed if word in UNITS.get(unit, ())), None)
 
 
 def time_unit(said: str | None, name: str, time: Array) -> Unit:
@@ -115,7 +112,7 @@ def time_unit(said: str | None, name: str, time: Array) -> Unit:
 def position_unit(
     said: str | int | None, name: str, values: Array, joint: RigJoint, spans: Spans = MappingProxyType({})
 ) -> Unit:
-    """Unit of angles (or metres of a sliding joint): the first that fits the joint's limits.
+    """Unit of angles (or metres of a sliding joint): the first that fits the joint's limits, in doubt without any.
 
     `said` may be the ticks of an encoder's turn, or `range`: LeRobot's share of the calibrated range of each motor,
     in which `spans` (motor -> [rad]) or else the joint's limits are -100 .. 100 (0 .. 100 of a gripper).
@@ -151,17 +148,14 @@ def position_unit(
 
 
 def _fitting(values: Array, joint: RigJoint) -> Unit:
-    """The first unit in which values fit the joint's limits, in doubt where there are none."""
     key, names = ("length_unit", LENGTH_UNITS) if joint.prismatic else ("angle_unit", ANGLE_UNITS)
     limited = bool(np.isfinite(joint.upper - joint.lower))
     by = "the joint's limits" if limited else "no limits of the joint that would tell"
     range_ = f"values {values.min():.3g} .. {values.max():.3g}"
     for unit in ("m", "mm") if joint.prismatic else ("rad", "deg"):
         if joint.reaches(values * names[unit]):
-            doubt = (
-                "" if limited else f"taken for {unit}, which no limits of the joint prove; source.{key}={unit} if so"
-            )
-            return Unit(unit, names[unit], f"{range_} and {by}", doubt=doubt)
+            doubt = f"taken for {unit}, which no limits of the joint prove; source.{key}={unit} if so"
+            return Unit(unit, names[unit], f"{range_} and {by}", doubt="" if limited else doubt)
     first = next(iter(names))
     doubt = f"taken for {first}, which does not fit the joint's limits ({range_}); source.{key}=UNIT"
     return Unit(first, 1.0, "assumed: no unit fits the joint's limits", doubt=doubt)
@@ -206,10 +200,7 @@ def calibrated_spans(path: Path) -> dict[str, float]:
 
 
 def _ticks(turn: int, values: Array, joint: RigJoint, source: str) -> Unit:
-    """Ticks of an encoder, with the zero at 0 or in the middle of the turn.
-
-    It is where the joint leaves its limits less; where it keeps them both ways, where it is nearer to the motion.
-    """
+    """Ticks with the zero at 0 or in the middle of the turn: where the joint leaves its limits less, or is nearer."""
     if turn < FEWEST_TICKS:
         raise InputError(f"source.angle_unit={turn}: a turn has more ticks; for instance {USUAL_TICKS}")
     size, middle = 2 * np.pi / turn, 0.5 * (values.min() + values.max())
@@ -224,16 +215,10 @@ def _ticks(turn: int, values: Array, joint: RigJoint, source: str) -> Unit:
 def geared(
     units: Mapping[str, Unit], logged: Mapping[str, Array], columns: Mapping[str, str], said: float | None = None
 ) -> dict[str, Unit]:
-    """Units of what is logged on the motor's side of a gear, as it is at the joint.
+    """Units at one joint of what is logged on the motor's side of a gear, which the motor's and the link's angle tell.
 
-    The motor's angle and the link's tell the gear. Commands are on the motor's side where they reach that far,
-    torques where their column says so.
-
-    Args:
-        units: of the signals of one joint, `link_position` among them.
-        logged: what the columns have.
-        columns: their names.
-        said: turns of the motor a turn of its link, if the user says them.
+    Commands are on the motor's side where they reach that far, torques where their column says so. `said`: turns of
+    the motor a turn of its link, if the user says them.
     """
     angles = [signal for signal in units if units[signal].name not in {*TORQUE_UNITS, *FORCE_UNITS}]
     # no joint's limits tell the unit of a motor's angle; its link's is the best guess
@@ -270,7 +255,7 @@ def same_unit(command: Unit, position: Unit, ratio: float) -> tuple[Unit, Unit]:
 
 
 def torque_unit(said: str | None, name: str, prismatic: bool, values: Array) -> Unit:
-    """Unit of torques, or of a sliding joint's forces; N m or N where nothing is said, in doubt.
+    """Unit of torques, or of a sliding joint's forces: N m or N in doubt.
 
     Raises:
         InputError: the column is no torque: its name says so, or it holds 0 and 1 alone.

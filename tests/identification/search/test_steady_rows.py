@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tactile_cube.identification.fitting.error_growth import FEWEST_ROWS, GROWN, steady_rows
+from tactile_cube.identification.search.search import FEWEST_ROWS, GROWN, steady_rows
 
 ROWS, SEGMENTS = 200, 20
 

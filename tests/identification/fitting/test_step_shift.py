@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 
 from tactile_cube.drivetrain.effects import catalogue
-from tactile_cube.identification.fitting.base import base_unknowns
 from tactile_cube.identification.fitting.intervals import bounds, final_fit
 from tactile_cube.identification.fitting.problem import Problem
+from tactile_cube.identification.fitting.resolution import FINER, finer
 from tactile_cube.identification.fitting.shooting import Shooting
-from tactile_cube.identification.fitting.time_step import FINER, finer
-from tactile_cube.identification.fitting.unknowns import read_all
+from tactile_cube.identification.fitting.unknowns import base_unknowns, read_all
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.nominal import nominal_model
