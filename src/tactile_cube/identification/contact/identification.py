@@ -222,9 +222,9 @@ class ContactSearch:
     def proposed(self) -> list[Proposal]:
         """Sets by their fit alone."""
         parent, found = Proposal((), self.base.fit), dict[frozenset[tuple[str, str]], Proposal]()
-        while len(parent.effects) < MOST and self.problem.judged(parent.fit.model).joint_errors.max() > (
-            self.criteria.floor
-        ):
+        most = self.criteria.floor
+        while len(parent.effects) < MOST and self.problem.judged(parent.fit.model).joint_errors.max() > most:
+            most = self.criteria.adequate  # what a world with the true effects leaves is no reason for one more
             grown = sorted(self.grown(parent), key=lambda one: one.price(self.criteria))
             found |= {named_by(one.effects): one for one in grown}
             if not grown or grown[0].price(self.criteria) >= parent.price(self.criteria):
