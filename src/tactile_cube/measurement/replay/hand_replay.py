@@ -45,10 +45,6 @@ class ContactModel:
         every = [(name, key, value) for name, values in self.values.items() for key, value in values.items()]
         return frozenset(one for one in every if one[2] != neutral[one[:2]])
 
-    def changed(self, effect: str, **values: float) -> ContactModel:
-        """The same with other values of one effect."""
-        return ContactModel({**self.values, effect: {**self.values.get(effect, {}), **values}})
-
 
 def contact_of(model: ModelFile | None) -> ContactModel:
     """What a model file says about fingertips and object."""
