@@ -7,7 +7,7 @@ import torch
 from tensordict import TensorDict
 from torchrl.modules import TanhNormal
 
-from tactile_cube.agent.networks import Actor, Sizes, squashed_log_prob
+from tactile_cube.agent.networks import Actor, Critic, Sizes, squashed_log_prob
 from tactile_cube.agent.sac import stochastic_actor
 from tactile_cube.training.collection import Behaviour
 
@@ -26,6 +26,12 @@ def test_actor_reads_the_observation_and_nothing_else() -> None:
     assert next(Actor(SIZES, (8,)).parameters()).shape[1] == SIZES.observation
 
 
+def test_critic_depends_on_privileged_state() -> None:
+    critic = Critic(SIZES, (64,))
+    o, a = torch.randn(1, 10), torch.randn(1, 3)
+    assert critic(o, torch.zeros(1, 4), a) != critic(o, torch.ones(1, 4), a)
+
+
 def test_log_prob_is_that_of_torchrl() -> None:
     mean, log_sigma, noise = torch.randn(6, 3), 0.3 * torch.randn(6, 3) - 1, torch.randn(6, 3)
     pre_tanh = mean + log_sigma.exp() * noise
@@ -42,7 +48,7 @@ def test_behaviour_draws_uniform_actions_while_random() -> None:
     behaviour = Behaviour(actor)
     data = TensorDict({"observation": torch.zeros(4000, 10)}, [4000])
     quiet = behaviour(data.clone())["action"]
-    behaviour.random = True
+    behaviour.random.fill_(1.0)
     wild = behaviour(data.clone())["action"]
     assert abs(wild.std().item() - 1 / 3**0.5) < 0.02
     assert abs(quiet.std().item() - 0.21) < 0.02

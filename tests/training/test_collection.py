@@ -48,6 +48,16 @@ def collect(collection: MultiSyncCollection, blocks: int = 1) -> None:
         collection.take()
 
 
+def test_killed_worker_is_reported_without_waiting_for_the_timeout() -> None:
+    collection = start(processes=2)
+    collection.restart(0, (0, 0.0))
+    collect(collection)
+    os.kill(collection._processes[0].pid, signal.SIGKILL)
+    with pytest.raises(CollectionError, match=r"^simulation worker failed to"):  # not: no answer within the timeout
+        collect(collection, blocks=3)
+    collection.close()
+
+
 def test_a_worker_killed_at_its_start_is_reported_though_its_sibling_keeps_its_pipe_open() -> None:
     def killed(worlds: int, seed: int) -> TransformedEnv:
         if seed == 1:  # begun after the sibling whose copy of the pipe stays open
@@ -71,6 +81,13 @@ def test_a_cold_start_is_not_taken_for_a_stuck_worker() -> None:
     assert collection.take().batch_size == (4, 5)
     with pytest.raises(CollectionError, match=r"collector\.timeout=0\.5 s"):
         collect(collection)
+    collection.close()
+
+
+def test_failing_world_is_reported() -> None:
+    collection = start(make=tiny_environment(fail_at=3).make, timeout=20.0)
+    with pytest.raises(CollectionError, match="worker"):
+        collect(collection, blocks=3)
     collection.close()
 
 

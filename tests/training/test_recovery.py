@@ -14,7 +14,7 @@ import pytest
 import torch
 from torchrl.envs import TransformedEnv
 
-from tactile_cube.training.collection import CollectionError
+from tactile_cube.training.collection import Background, CollectionError, MultiSyncCollection
 from tactile_cube.training.run import Run, train_on
 from tests.training.tiny_env import TinyEnv, tiny_environment, tiny_world
 from tests.training.tiny_run import finish, tiny_run, weights
@@ -102,13 +102,16 @@ def test_a_run_that_starts_over_does_so_once(tmp_path: Path, reference: torch.Te
 
 
 def test_ctrl_c_while_workers_start_leaves_none_of_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(*_: Any) -> None:
-        raise KeyboardInterrupt
+    class Waiting:
+        def result(self, timeout: float) -> None:
+            raise KeyboardInterrupt
 
-    monkeypatch.setattr("tactile_cube.training.collection.wait", interrupted)
+    monkeypatch.setattr(Background, "submit", lambda self, call: Waiting())
+    killed = list[bool]()
+    monkeypatch.setattr(MultiSyncCollection, "_kill", lambda self: killed.append(True))
     with pytest.raises(KeyboardInterrupt):
         tiny_run(tmp_path, collector=COLLECTOR)
-    assert not multiprocessing.active_children()
+    assert killed
 
 
 def test_a_run_whose_workers_are_ended_with_it_ends_and_goes_on_later(tmp_path: Path, reference: torch.Tensor) -> None:

@@ -5,30 +5,40 @@ generator and the worlds' own, and `restart` sets both.
 """
 
 import contextlib
+import copy
 import ctypes
+import multiprocessing
 import os
-import pickle
+import queue
 import signal
+import threading
 import time
 from collections.abc import Callable
-from multiprocessing.connection import Connection, wait
+from concurrent.futures import Future, TimeoutError
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import torch
-from tensordict import TensorDictBase
+from tensordict import TensorDict, TensorDictBase
 from tensordict.nn import TensorDictModuleBase
-from torchrl.collectors import Collector
+from torchrl.collectors import Collector, MultiSyncCollector
 from torchrl.envs import EnvBase
+from torchrl.weight_update import SharedMemWeightSyncScheme, WeightSyncScheme
 
 from tactile_cube.agent.networks import Actor
 from tactile_cube.env import Conditions
 from tactile_cube.training.settings import CollectorSettings
 
+T = TypeVar("T")
 MakeEnv = Callable[..., EnvBase]
 """make_env(worlds=n, seed=s) -> batched environment of n worlds whose first transform is a `Curriculum`."""
 Progress = tuple[Any, ...]
 """What `Curriculum.set_progress` takes."""
+GLANCE = 0.5
+"""How long a dead worker may go unnoticed [s]; siblings that inherited its pipe would hide its death for ever."""
+LAST_START = 3.0
+"""How long a start that is given up may go on making processes [s]."""
 
 
 class CollectionError(RuntimeError):
@@ -36,9 +46,10 @@ class CollectionError(RuntimeError):
 
 
 class Behaviour(TensorDictModuleBase):  # type: ignore[misc]
-    """The stochastic actor, or uniform actions while it is `random`, as in the first steps of a run.
+    """The stochastic actor, its own copy, or uniform actions in the first steps of a run.
 
-    Noise comes from torch's global generator of the process.
+    Whether actions are random travels with the weights as a buffer, so that it reaches every worker in the same
+    iteration. Noise comes from torch's global generator of the worker.
     """
 
     in_keys = ["observation"]  # noqa: RUF012 - the name and type TorchRL asks for
@@ -46,7 +57,13 @@ class Behaviour(TensorDictModuleBase):  # type: ignore[misc]
 
     def __init__(self, actor: Actor):
         super().__init__()
-        self.actor, self.random = actor, False
+        self.actor = copy.deepcopy(actor).requires_grad_(False)
+        self.register_buffer("random", torch.zeros(()))
+
+    def take_over(self, actor: Actor, random: bool) -> None:
+        """Act as `actor` does from here on, or at random."""
+        self.actor.load_state_dict(actor.state_dict())
+        self.random.fill_(float(random))
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Sample an action for each world."""
@@ -59,19 +76,14 @@ class Behaviour(TensorDictModuleBase):  # type: ignore[misc]
 class SingleCollection:
     """All worlds in this process, stepped before the learner's updates: nothing overlaps, everything is in reach.
 
-    Args:
-        make_env: see `MakeEnv`.
-        actor: the one that acts; `launch` gives it others' weights.
-        settings: number of worlds.
-        steps: environment steps a world and block.
-        seed: of the worlds until the first restart.
+    Arguments as of `MultiSyncCollection`.
     """
 
-    def __init__(self, make_env: MakeEnv, actor: Actor, settings: CollectorSettings, steps: int, seed: int = 0):
-        self._behaviour = Behaviour(actor.requires_grad_(False))
+    def __init__(self, make_env: MakeEnv, actor: Actor, settings: CollectorSettings, steps: int):
+        self._behaviour = Behaviour(actor)
         with torch.random.fork_rng(devices=[]):  # worlds seed torch's generator, which here is the learner's too
             self._collector = Collector(
-                make_env(worlds=settings.worlds, seed=seed),
+                make_env(worlds=settings.worlds, seed=0),
                 self._behaviour,
                 frames_per_batch=settings.worlds * steps,
                 total_frames=-1,
@@ -83,28 +95,23 @@ class SingleCollection:
         self._block: TensorDictBase | None = None
         self._cpu = 0.0
 
-    def restart(self, seed: int, progress: Progress) -> int:
-        """Reset all worlds and seed everything random in them; gives the seed of a worker beside this one."""
-        self.set_progress(progress)
+    def restart(self, seed: int, progress: Progress) -> None:
+        """Reset all worlds and seed everything random in them."""
+        self._set_progress(progress)
 
-        def seed_and_reset() -> int:
-            following: int = self._collector.set_seed(seed)
+        def seed_and_reset() -> None:
+            self._collector.set_seed(seed)
             torch.manual_seed(seed)
             self._collector.reset()
-            return following
 
-        return int(self._aside(seed_and_reset))
+        self._aside(seed_and_reset)
 
     def launch(self, actor: Actor, random: bool, progress: Progress) -> Conditions:
         """Collect one block."""
-        self._behaviour.actor.load_state_dict(actor.state_dict())
-        conditions, self._block = self.collect(random, progress)
+        conditions = self._set_progress(progress)
+        self._behaviour.take_over(actor, random)
+        self._block = self._aside(lambda: next(self._blocks).clone())
         return conditions
-
-    def collect(self, random: bool, progress: Progress) -> tuple[Conditions, TensorDictBase]:
-        """Conditions of a block, and the block."""
-        self._behaviour.random = random
-        return self.set_progress(progress), self._aside(lambda: next(self._blocks).clone())
 
     def take(self) -> TensorDictBase:
         """The block collected last."""
@@ -119,8 +126,7 @@ class SingleCollection:
         """Close the worlds."""
         self._collector.shutdown()
 
-    def set_progress(self, progress: Progress) -> Conditions:
-        """Tell the curriculum; gives the conditions of the episodes that start from here on."""
+    def _set_progress(self, progress: Progress) -> Conditions:
         conditions: Conditions = self._collector.env.transform[0].set_progress(*progress)
         return conditions
 
@@ -137,56 +143,71 @@ class SingleCollection:
 
 
 class MultiSyncCollection:
-    """Worker processes, each a `SingleCollection` of several worlds, that collect while the learner updates.
+    """Worker processes that host several worlds each and step them while the learner updates.
 
-    Weights are in memory that all share: the learner writes them while the workers wait. A worker that is killed is
-    noticed at once, one that hangs after the time limit of the settings. TorchRL's own `MultiSyncCollector` would wait
-    for ever for a worker that hangs, and to send weights to a dead one.
+    Args:
+        make_env: see `MakeEnv`.
+        actor: any actor of the right sizes.
+        settings: number of worlds and workers, and how long to wait for them.
+        steps: environment steps a world and block.
 
     Raises:
         CollectionError: a worker failed, died or got stuck, here or in any method.
     """
 
     def __init__(self, make_env: MakeEnv, actor: Actor, settings: CollectorSettings, steps: int):
-        self._settings, self._started, self._collecting = settings, False, False
-        self._actor = actor.requires_grad_(False).share_memory()
-        context: Any = torch.multiprocessing.get_context(settings.start_method)
-        parent = None if settings.start_method == "forkserver" else os.getpid()
-        share = settings.model_copy(update={"worlds": settings.worlds // settings.workers})
-        self._pipes, self._processes = list[Connection](), list[Any]()
+        self._settings, self._started = settings, False
+        self._behaviour, self._weights, self._thread = Behaviour(actor), WeightSync(), Background()
+        self._block: Future[TensorDictBase] | None = None
         self._final_cpu: float | None = None
+        self._processes: list[Any] = []
+        self._others = set(multiprocessing.active_children())
         try:
-            for index in range(settings.workers):
-                mine, its = context.Pipe()
-                work = (its, parent, make_env, self._actor, share, steps, index)
-                process = context.Process(target=_work, args=work, daemon=True)
-                self._pipes.append(mine)
-                self._processes.append(process)
-                process.start()
-                its.close()
-            self._answers("start")
-        except BaseException:  # Ctrl-C too
-            self._kill()
+            self._collector, self._blocks = self._call(partial(self._build, make_env, steps), "start")
+        except BaseException:
+            self._thread.close()
             raise
+        self._processes = self._collector.procs
+
+    def _build(self, make_env: MakeEnv, steps: int) -> tuple[MultiSyncCollector, Any]:
+        method, workers, worlds = self._settings.start_method, self._settings.workers, self._settings.worlds
+        torch.multiprocessing.set_start_method(method, force=True)
+        threads = torch.get_num_threads()
+        collector = MultiSyncCollector(
+            [make_env] * workers,
+            self._behaviour,
+            create_env_kwargs=[{"worlds": worlds // workers, "seed": index} for index in range(workers)],
+            frames_per_batch=worlds * steps,
+            total_frames=-1,
+            cat_results="stack",
+            num_threads=threads,
+            num_sub_threads=1,
+            trust_policy=True,
+            auto_register_policy_transforms=False,
+            weight_sync_schemes={"policy": self._weights},
+            init_fn=partial(prepare_worker, None if method == "forkserver" else os.getpid()),
+        )
+        torch.set_num_threads(threads)
+        return collector, iter(collector)
 
     def restart(self, seed: int, progress: Progress) -> None:
-        """Reset all worlds and seed everything random in them, each worker from the seed after its neighbour's."""
-        for index in range(len(self._pipes)):
-            seed = self._ask("restart", (seed, progress), index)[0]
+        """Reset all worlds and seed everything random in them."""
+        self._set_progress(progress)
+        self._call(partial(self._collector.set_seed, seed), "restart")
 
     def launch(self, actor: Actor, random: bool, progress: Progress) -> Conditions:
         """Hand the weights to the workers and let them collect one block."""
-        self._actor.load_state_dict(actor.state_dict())
-        conditions: Conditions = self._ask("set_progress", (progress,))[0]
-        self._send("collect", (random, progress))
-        self._collecting = True
+        conditions = self._set_progress(progress)
+        self._behaviour.take_over(actor, random)
+        weights = TensorDict.from_module(self._behaviour).data.clone()
+        self._block = self._thread.submit(partial(self._collect, weights))
         return conditions
 
     def take(self) -> TensorDictBase:
         """Wait for the block begun last."""
-        assert self._collecting, "launch first"
-        block: TensorDictBase = torch.cat([block for _, block in self._answers("collect")])
-        self._started, self._collecting = True, False
+        assert self._block is not None, "launch first"
+        block: TensorDictBase = self._wait(self._block, "collect")
+        self._started = True
         return block
 
     def cpu_seconds(self) -> float:
@@ -197,68 +218,129 @@ class MultiSyncCollection:
         """End the workers: nothing in them is worth a wait, and one that is stuck would not listen."""
         self._final_cpu = self.cpu_seconds()
         self._kill()
+        closing = self._thread.submit(partial(self._collector.shutdown, timeout=1.0, raise_on_error=False))
+        with contextlib.suppress(Exception):  # the thread is daemonic: it may stay where it is
+            closing.result(timeout=3.0)
+        self._thread.close()
 
-    def _ask(self, name: str, arguments: tuple[Any, ...], worker: int | None = None) -> list[Any]:
-        self._send(name, arguments, worker)
-        return self._answers({"set_progress": "set the curriculum"}.get(name, name), worker)
+    def _set_progress(self, progress: Progress) -> Conditions:
+        arguments = [progress] * self._settings.workers
+        call = partial(self._collector.map_fn, "env.transform[0].set_progress", arguments)
+        conditions: Conditions = self._call(call, "set the curriculum")[0]
+        return conditions
 
-    def _send(self, name: str, arguments: tuple[Any, ...], worker: int | None = None) -> None:
-        for pipe in self._pipes if worker is None else [self._pipes[worker]]:
-            with contextlib.suppress(OSError):  # of a worker that is dead: its answer says so
-                pipe.send((name, arguments))
+    def _collect(self, weights: TensorDictBase) -> TensorDictBase:
+        for index, process in enumerate(self._processes):  # torchrl would hang sending weights to a dead worker
+            if not process.is_alive():
+                raise RuntimeError(f"worker {index} ended with exit code {process.exitcode}")
+        self._collector.update_policy_weights_(weights)
+        block: TensorDictBase = next(self._blocks).flatten(0, 1).clone()
+        return block
 
-    def _answers(self, doing: str, worker: int | None = None) -> list[Any]:
-        """An answer of each worker, or of one."""
+    def _call(self, call: Callable[[], Any], doing: str) -> Any:
+        return self._wait(self._thread.submit(call), doing)
+
+    def _wait(self, future: "Future[Any]", doing: str) -> Any:
         name = "timeout" if self._started else "start_timeout"  # workers that start may have to compile first
         seconds = float(getattr(self._settings, name))
-        until, answers = time.monotonic() + seconds, list[Any]()
-        asked = range(len(self._pipes)) if worker is None else [worker]
         try:
-            for index in asked:
-                pipe, sentinels = self._pipes[index], [one.sentinel for one in self._processes]
-                ready = wait([pipe, *sentinels], max(until - time.monotonic(), 0.0))
-                if not ready:
-                    limit = f"collector.{name}={seconds:g} s (to {doing})"
-                    raise CollectionError(f"no simulation worker answered within {limit}")
-                if pipe not in ready:  # this worker or another one ended
-                    ended = self._processes[sentinels.index(ready[0])]
-                    ended.join(1.0)
-                    raise CollectionError(f"simulation worker failed to {doing}: exit code {ended.exitcode}")
-                answers.append(pickle.loads(pipe.recv_bytes()))
-                if isinstance(answers[-1], CollectionError):
-                    raise CollectionError(f"simulation worker failed to {doing}: {answers[-1]}")
-        except (EOFError, OSError):
+            return self._answer(future, seconds)
+        except TimeoutError:
             self._kill()
-            raise CollectionError(f"simulation worker failed to {doing}: it ended") from None
+            raise CollectionError(
+                f"no simulation worker answered within collector.{name}={seconds:g} s (to {doing})"
+            ) from None
+        except Exception as error:
+            self._kill()
+            raise CollectionError(f"simulation worker failed to {doing}: {error}") from error
         except BaseException:  # Ctrl-C: workers ignore it, and would be waited for
             self._kill()
             raise
-        return answers
+
+    def _answer(self, future: "Future[Any]", seconds: float) -> Any:
+        until = time.monotonic() + seconds
+        while True:
+            try:
+                return future.result(timeout=max(min(GLANCE, until - time.monotonic()), 0.0))
+            except TimeoutError:
+                if future.done() or time.monotonic() >= until:
+                    raise
+                if not all(process.is_alive() for process in getattr(self._weights.context, "procs", ())):
+                    self._kill()  # what waits for it, says so then
+                    until = time.monotonic() + LAST_START
 
     def _kill(self) -> None:
-        for process in self._processes:
-            if process.pid is not None:
-                process.kill()
-                process.join(1.0)
-        for pipe in self._pipes:
-            pipe.close()
+        idle = self._thread.submit(lambda: None)  # before, it may start one more
+        until = time.monotonic() + LAST_START
+        while not idle.done() and time.monotonic() < until:
+            self._kill_children()
+            with contextlib.suppress(TimeoutError):
+                idle.result(timeout=0.05)
+        self._kill_children()
+
+    def _kill_children(self) -> None:
+        # also those of a start that did not come to its end: they would be waited for when the program ends
+        for process in set(multiprocessing.active_children()) - self._others:
+            process.kill()
+            process.join(1.0)
 
 
 Collection = SingleCollection | MultiSyncCollection
 """A source of blocks of experience (worlds, steps)."""
 
 
-def _work(
-    pipe: Connection,
-    parent: int | None,
-    make_env: MakeEnv,
-    actor: Actor,
-    settings: CollectorSettings,
-    steps: int,
-    index: int,
-) -> None:
-    """Answer what the main process asks of a collection, until it ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the main process
+class WeightSync(SharedMemWeightSyncScheme):  # type: ignore[misc]
+    """Weights in shared memory, without a farewell: workers are killed, and nobody waits for what they do not read.
+
+    torchrl's own sends "stop" when it is deleted. Where that is at the end of the interpreter, the thread that a
+    queue's first item starts never runs, and the program never ends.
+    """
+
+    def init_on_sender(self, *args: Any, **kwargs: Any) -> None:
+        """Make the queues."""
+        super().init_on_sender(*args, **kwargs)
+        for queues in (self._weight_init_queues, self._instruction_queues, self._ack_queues):
+            for one in queues.values():
+                one.cancel_join_thread()
+
+    def shutdown(self) -> None:
+        """End the thread that receives weights, in a worker."""
+        WeightSyncScheme.shutdown(self)
+
+
+class Background:
+    """A daemon thread that runs submitted calls one after another, so that none is waited for without a time limit.
+
+    Daemonic, because a call may be stuck in a pipe to a dead process, and that must not keep the program from ending.
+    One for all calls, because a worker ends with the thread that started it (`prepare_worker`).
+    """
+
+    def __init__(self) -> None:
+        self._calls: queue.SimpleQueue[tuple[Future[object], Callable[[], object]] | None] = queue.SimpleQueue()
+        threading.Thread(target=self._run, daemon=True, name="collection").start()
+
+    def submit(self, call: Callable[[], T]) -> "Future[T]":
+        """Queue a call; its result or exception arrives in the future."""
+        future: Future[T] = Future()
+        self._calls.put((future, call))  # type: ignore[arg-type]
+        return future
+
+    def close(self) -> None:
+        """End the thread after the calls already queued."""
+        self._calls.put(None)
+
+    def _run(self) -> None:
+        while (entry := self._calls.get()) is not None:
+            future, call = entry
+            try:
+                future.set_result(call())
+            except BaseException as error:  # noqa: BLE001, RUF100 - handed to whoever asks for the result
+                future.set_exception(error)
+
+
+def prepare_worker(parent: int | None) -> None:
+    """Leave Ctrl-C to the main process `parent`, and end with it even if it is killed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     torch.set_num_threads(1)
     if os.uname().sysname == "Linux":
@@ -266,15 +348,6 @@ def _work(
         ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGKILL)  # SIGTERM would not reach a stopped process
         if parent is not None and os.getppid() != parent:  # it ended before
             os._exit(1)
-    with contextlib.suppress(EOFError, OSError):  # the main process is gone
-        try:
-            collection = SingleCollection(make_env, actor, settings, steps, seed=index)
-            pipe.send_bytes(pickle.dumps(None))
-            while True:
-                name, arguments = pipe.recv()
-                pipe.send_bytes(pickle.dumps(getattr(collection, name)(*arguments)))
-        except Exception as error:  # of any kind: the main process says it
-            pipe.send_bytes(pickle.dumps(CollectionError(str(error))))
 
 
 def _cpu_seconds(process: Any) -> float:
