@@ -120,7 +120,7 @@ def _ours(fitted: Recording, held_out: Recording) -> tuple[float, float]:
     """Processor seconds of the fit, and the error on the held-out trials [rad]."""
     began = time.process_time()
     search = Search(fitted, held_out, sensor_noise(fitted), (), lambda line: None)
-    base = search.fit_base()
+    base = search.base
     seconds = time.process_time() - began
     model = base.judgement.model
     return seconds, free_run_error(held_out, free_run(held_out, model, step=STEP)).overall

@@ -22,8 +22,8 @@ from tactile_cube.measurement.recordings.tables import read_table
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable, require_free, write_recordings
 from tactile_cube.measurement.sources.column_map import map_columns
 from tactile_cube.measurement.sources.csv_files import kinds_of
-from tactile_cube.measurement.sources.lever import Lever
 from tactile_cube.measurement.sources.log_file import LEROBOT, READERS, read_logs
+from tactile_cube.measurement.sources.mechanism import Lever
 from tactile_cube.measurement.sources.source import recording_tables, source_settings
 from tactile_cube.untrusted_file import below
 from tactile_cube.whole_file import write_whole

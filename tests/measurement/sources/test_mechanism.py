@@ -100,7 +100,7 @@ def test_guesses_a_third_off_are_fitted_back_to_the_noise(tmp_path: Path) -> Non
     urdf.write_text(urdf.read_text().replace(f'mass value="{mass:.9g}"', f'mass value="{0.7 * mass:.9g}"'))
     search, _ = divided(read_recording(tmp_path / "out"), (), 0, lambda line: None)
     assert [term.label for term in search.start.terms] == ["payload@pendulum"]
-    base = search.fit_base()
+    base = search.base
     assert base.judgement.error < 1.2
     assert 0.7 * mass + base.fit.model.terms[0].values["mass"] == pytest.approx(mass, rel=0.1)
 
