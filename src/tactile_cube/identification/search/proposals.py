@@ -71,15 +71,19 @@ def look(search: Search, parent: Proposal, at: Sequence[str]) -> Looks:
     problem.linearise_starts(parent.fit.model)
     frozen = renewed(problem, parent.fit, *problem.columns(parent.fit.model, parent.fit.unknowns))
     there = named_by(parent.effects)
-    known = [*search.candidates, *residual_candidates(problem, search.fitted, frozen, search.effects)]
     possible = [
         one
-        for one in search.new(known)
+        for one in wanted(search, problem, frozen)
         if there.isdisjoint(named_by([one])) and (one.joints[0] in at or one.effect.stage is Stage.MECHANISM)
     ]
     scores = screen(problem, frozen, possible)
     tried = sorted((stepped(problem, frozen, one) for one in best_starts(scores)), key=lambda pair: pair[1].cost)
     return Looks(parent, problem, frozen, tried, scores)
+
+
+def wanted(search: Search, problem: Problem, frozen: Fit) -> list[Candidate]:
+    """What may be added to a fit: at starts of its own, or read from what the fit leaves."""
+    return search.new([*search.candidates, *residual_candidates(problem, search.fitted, frozen, search.effects)])
 
 
 def stepped(problem: Problem, frozen: Fit, candidate: Candidate) -> tuple[Candidate, Fit]:
