@@ -168,13 +168,7 @@ def test_from_dropped_logs_to_the_error_at_the_noise(
     assert window.get_by_role("radio", name=FIRST).count() == 0, "the model has it"
     assert window.locator("option", has_text=re.compile("^stribeck_friction$")).count() == 0
     picture(window, "4_added")
-    ranges = "[...Bokeh.documents[0]._all_models.values()].filter((one) => one.type == 'Range1d')"
-    zoomed = f"() => {ranges}.some((one) => one.start === 0 && one.end < 1.0)"
-    assert not window.evaluate(zoomed)
-    window.locator(".bk-events").first.click(position={"x": 85, "y": 100})
-    window.wait_for_function(zoomed)
     window.get_by_label("beside").select_option("1: refitted")
-    window.get_by_label("where it fails").select_option(index=1)
     picture(window, "4_zoomed")
     window.get_by_role("button", name="Propose").click()
     window.get_by_text("times the evidence needed").wait_for()

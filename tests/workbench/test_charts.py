@@ -8,6 +8,8 @@ import yaml
 
 pytest.importorskip("bokeh")
 
+from bokeh.events import Tap
+
 from tactile_cube.measurement.comparing.comparison import Comparison, describe_comparison
 from tactile_cube.measurement.comparing.noise_floor import noise_floor
 from tactile_cube.measurement.recordings.reading import read_recording
@@ -73,3 +75,13 @@ def test_degrees_stay_degrees(tmp_path: Path) -> None:
     assert lacks.figure.xaxis[0].axis_label.text == "velocity of a [deg/s]"
     assert lacks.figure.yaxis[0].axis_label.text == "missing torque [N m]"
     assert np.max(lacks.points.data_source.data["x"]) > 50.0
+
+
+def test_a_click_into_a_failing_interval_zooms_to_it(tmp_path: Path) -> None:
+    chart = TimeChart()
+    chart.show(compared(tmp_path, "position"), 0, None)
+    chart.failing.data = {"x0": [1.0], "x1": [1.2]}
+    chart._zoom_into(Tap(None, x=0.9))
+    assert (chart.x.start, chart.x.end) == (0.0, chart.x.reset_end)
+    chart._zoom_into(Tap(None, x=1.1))
+    assert (chart.x.start, chart.x.end) == (0.5, 1.7)
