@@ -8,7 +8,7 @@ stopped, and writes contact_identification.md beside it. Seeds below 100 are for
 | hidden | right | acceptable | wrong |
 |---|---|---|---|
 | nothing | `adequate` | | everything else (a false alarm) |
-| an effect | `missing_effect`, that one alone | `ambiguous` with it in the set, `unknown_effect` | the rest |
+| an effect | `missing_effect`, it alone | `ambiguous` or `partly_explained` with it, `unknown_effect` | the rest |
 
 `adequate` for a hidden effect is wrong; the reason tells whether identify, told the effect, sees nothing of it either
 (the held-out error falls by less than SHOWN). Whether the stated 95 % interval holds the truth is judged apart.
@@ -92,7 +92,7 @@ def score(line: dict[str, Any]) -> tuple[str, str]:
         return ("right", "nothing hidden") if verdict == "adequate" else ("wrong", "false alarm")
     if verdict == "missing_effect" and names == [truth]:
         return "right", "named"
-    if verdict == "ambiguous":
+    if verdict in ("ambiguous", "partly_explained"):
         return ("acceptable", "in the set") if truth in names else ("wrong", "not in the set")
     if verdict == "unknown_effect":
         return "acceptable", "not sure"

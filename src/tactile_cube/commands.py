@@ -59,10 +59,11 @@ def diagnose(job: Job) -> None:
     from tactile_cube.api.diagnosis import run_diagnosis
 
     found = run_diagnosis(job, job.config.recording, job.config.model)
-    found.write(job.folder)
-    print(found.text)
-    for name, file in {"report": "report.html", "model": "model.yaml", "diagnosis": "diagnosis.json"}.items():
-        print(f"{name}: {job.folder / file}")
+    print(found.text, flush=True)
+    found.write(job.folder, job.config.report)
+    files = {"report": "report.html", "model": "model.yaml", "diagnosis": "diagnosis.json"}
+    for name in files if job.config.report else ("model", "diagnosis"):
+        print(f"{name}: {job.folder / files[name]}")
 
 
 def effects(job: Job) -> None:
@@ -106,8 +107,9 @@ def identify(job: Job) -> None:
     from tactile_cube.api.identification import run_identification
 
     found = run_identification(job, job.config.recording)
+    print(found.text, flush=True)
     found.write(job.folder)
-    print(f"{found.text}\nmodel: {job.folder / 'model.yaml'}\nreport: {job.folder / 'report.html'}")
+    print(f"model: {job.folder / 'model.yaml'}\nreport: {job.folder / 'report.html'}")
 
 
 def monitor(job: Job) -> None:

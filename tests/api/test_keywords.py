@@ -14,7 +14,7 @@ from tactile_cube.api.job import NO_KEYS, as_word, called_job
 from tactile_cube.composition import ADDED, CONFIG, commands
 from tactile_cube.errors import InputError
 
-FOLDERS_AND_FILES = {"name", "hydra", "film", "rerun"}
+FOLDERS_AND_FILES = {"name", "hydra", "film", "report", "rerun"}
 """Keys that say where the command's files go and which: a program has `folder`, and `write` of what comes back."""
 OF_RECIPES = {"stages", "judgement"}
 

@@ -115,7 +115,7 @@ class Rivals:
 
     @cached_property
     def motions(self) -> PossibleMotions:
-        return PossibleMotions.of_fits(self.shooting, self.recording, list(self.fits.values()), MARGIN)
+        return PossibleMotions(self.shooting, self.recording, list(self.fits.values()), MARGIN)
 
     @cached_property
     def proposed(self) -> list[tuple[Trial, Safety]]:

@@ -10,7 +10,7 @@ from omegaconf import OmegaConf
 from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
 from tactile_cube.drivetrain.model_file import ModelFile, as_model
 from tactile_cube.errors import InputError, warn
-from tactile_cube.identification.contact.trial import compare_contact
+from tactile_cube.identification.contact.grasps import compare_contact
 from tactile_cube.measurement.bench import has_free_motion, with_object, without_touches
 from tactile_cube.measurement.comparing.comparison import USUAL_STEP, Comparison, compare_recording, comparison_json
 from tactile_cube.measurement.recordings.reading import read_recording

@@ -14,7 +14,7 @@ from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
 from tactile_cube.drivetrain.effects import catalogue, find_effect
 from tactile_cube.drivetrain.model_file import ModelFile, write_model
 from tactile_cube.errors import InputError
-from tactile_cube.identification.contact.diagnosis import ContactDiagnosis, diagnose_contact, with_contact
+from tactile_cube.identification.contact.identification import ContactDiagnosis, diagnose_contact, with_contact
 from tactile_cube.identification.criteria import Criteria
 from tactile_cube.identification.diagnosis import Diagnosis, diagnose_recording, write_experiment
 from tactile_cube.identification.diagnosis_json import as_json
@@ -66,32 +66,32 @@ class DiagnosisResult:
         units = {"shown_in": self.recording.shown}
         return answer(self.data | units, self.free.experiment if self.free else None, constants)
 
-    def write(self, folder: PathLike) -> None:
-        """Write model.yaml, diagnosis.json, report.html and, of free motion, diagnosis.rrd and the next experiment."""
-        from tactile_cube.visualization.diagnosis_report import contact_diagnosis_report
-        from tactile_cube.visualization.report import write_report
-
-        path, made = str(Path(folder) / "model.yaml"), self.model.provenance
+    def write(self, folder: PathLike, report: bool = True) -> None:
+        """Write model.yaml, diagnosis.json and the next experiment; with `report`, report.html and diagnosis.rrd."""
         with written_together(Path(folder), "diagnosis.json") as aside:
             write_model(self.model, aside / "model.yaml")
             write_json(aside / "diagnosis.json", self.data)
-            if self.free is None:
-                page = contact_diagnosis_report(self.data, self.model.rig, made.command, made.recording, path)
-            else:
-                page = self._free_page(aside, path, self.free)
-            write_report(page, aside / "report.html")
+            if self.free is not None:
+                write_experiment(self.free, aside)
+            if report:
+                self._write_report(aside, str(Path(folder) / "model.yaml"))
 
-    def _free_page(self, folder: Path, path: str, found: Diagnosis) -> Any:
+    def _write_report(self, folder: Path, path: str) -> None:
         from tactile_cube.visualization.comparison_episode import write_comparison
-        from tactile_cube.visualization.diagnosis_report import diagnosis_report
+        from tactile_cube.visualization.diagnosis_report import contact_diagnosis_report, diagnosis_report
+        from tactile_cube.visualization.report import write_report
 
-        write_experiment(found, folder)
-        config, recording = self.job.config, without_touches(self.recording)
+        config, found = self.job.config, self.free
+        if found is None:
+            page = contact_diagnosis_report(self.data, self.recording, self.job.command, path)
+            return write_report(page, folder / "report.html")
+        recording = without_touches(self.recording)
         before = compare_recording(recording, self.known, config.step, floor=found.floor)
         after = compare_recording(recording, self.model, config.step, floor=found.floor)
         write_comparison(after, folder / "diagnosis.rrd")
         shapes = [shape for one in found.unexplained for shape in one.shapes[:SHAPES]]
-        return diagnosis_report(self.data, before, after, self.job.command, path, shapes, found.experiment)
+        page = diagnosis_report(self.data, before, after, self.job.command, path, shapes, found.experiment)
+        return write_report(page, folder / "report.html")
 
 
 @as_input_errors
@@ -145,7 +145,7 @@ def run_diagnosis(
 
 def _of_grasps(job: Job, recording: Recording, known: ModelFile | None, say: Say) -> DiagnosisResult:
     config = job.config
-    contact = diagnose_contact(recording, known, config.step, config.seed, say)
+    contact = diagnose_contact(recording, known, config.step, config.seed, say, Criteria(**config.criteria))
     model = stated_model(recording, job.command, config.seed)
     if known is not None:
         model = known.model_copy(update={"provenance": model.provenance})
@@ -170,7 +170,7 @@ def _of_free_motion(job: Job, recording: Recording, known: ModelFile | None, say
         data["known_effects"] += [one.effect for one in known.object_effects]
     contact = None
     if with_object(recording).trials:
-        contact = diagnose_contact(recording, model, config.step, config.seed, say)
+        contact = diagnose_contact(recording, model, config.step, config.seed, say, criteria)
         model, data = contact.into(model, alone=False), with_contact(data, contact)
         data["seconds"] = job.seconds
     return DiagnosisResult(recording, known, found, contact, model, data, job)

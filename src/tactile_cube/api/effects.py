@@ -9,7 +9,7 @@ from itertools import groupby
 from tactile_cube.composition import suggestion
 from tactile_cube.drivetrain.effects import Effect, Parameter, catalogue
 from tactile_cube.errors import InputError
-from tactile_cube.simulation.contact_effects import ContactEffect, contact_catalogue
+from tactile_cube.simulation.contact_effects import contact_catalogue
 
 NOTE = re.compile(r"^(In data|Confused with|Source): ", re.MULTILINE)
 COLUMNS = ("parameter", "unit", "neutral", "typical", "range searched", "source")
@@ -63,7 +63,7 @@ def effects(name: str | None = None) -> tuple[EffectDescription, ...]:
         ...     print(effect.name, effect.summary)
         >>> print(tactile_cube.effects("stribeck_friction")[0].text)
     """
-    known: dict[str, type[Effect] | type[ContactEffect]] = {**catalogue(), **contact_catalogue()}
+    known: dict[str, type[Effect]] = {**catalogue(), **contact_catalogue()}
     if name is None:
         return tuple(_described(kind) for kind in known.values())
     if name not in known:
@@ -82,14 +82,13 @@ def effects_table(descriptions: Sequence[EffectDescription]) -> str:
     return "\n".join([*lines, "", "name=EFFECT shows one in detail: its law, what it looks like in data, its source."])
 
 
-def _described(kind: type[Effect] | type[ContactEffect]) -> EffectDescription:
+def _described(kind: type[Effect]) -> EffectDescription:
     about, *parts = NOTE.split(inspect.getdoc(kind) or "")
     summary, _, law = about.strip().partition("\n\n")
     notes = dict(zip(parts[::2], (" ".join(note.split()) for note in parts[1::2]), strict=True))
-    if simpler := getattr(kind, "contains", ()):
-        notes["Special cases"] = ", ".join(f"`{name}`" for name in simpler)
-    stage = getattr(kind, "stage", None)
-    acts_on = stage.name.lower().replace("_", " ") if stage else "contact"
+    if kind.contains:
+        notes["Special cases"] = ", ".join(f"`{name}`" for name in kind.contains)
+    acts_on = kind.stage.name.lower().replace("_", " ")
     return EffectDescription(kind.name, acts_on, " ".join(summary.split()), law, notes, kind.parameters)
 
 

@@ -10,9 +10,8 @@ from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
 from tactile_cube.drivetrain.model_file import Estimate, ModelFile, as_model, write_model
 from tactile_cube.errors import InputError
 from tactile_cube.identification.contact.identification import ContactIdentification, contact_effects, identify_contact
-from tactile_cube.identification.export.bam import as_bam
-from tactile_cube.identification.export.mjcf import as_mjcf
-from tactile_cube.identification.export.urdf import as_urdf
+from tactile_cube.identification.export.joint_drive import as_bam
+from tactile_cube.identification.export.robot_file import as_mjcf, as_urdf
 from tactile_cube.identification.identification import Identification, identify_effects
 from tactile_cube.identification.in_words import errors_by_stage
 from tactile_cube.identification.model_files import model_file, stated_model
@@ -50,7 +49,7 @@ class IdentificationResult:
     def text(self) -> str:
         """The error after each stage, and the values with their intervals."""
         lines = [errors_by_stage(self.data["error"], self.model, self.recording.units)]
-        for parameter in self.contact.as_json()["silent"] if self.contact else []:
+        for parameter in self.contact.silent if self.contact else []:
             lines.append(f"warning: {parameter}: no trial shows it; its interval is the whole range that was searched")
         return "\n".join(lines)
 
@@ -71,12 +70,12 @@ class IdentificationResult:
 
     def _free_page(self, folder: Path, path: str, found: Identification) -> Any:
         from tactile_cube.visualization.comparison_episode import write_comparison
-        from tactile_cube.visualization.diagnosis_report import contact_sections, identification_report
+        from tactile_cube.visualization.diagnosis_report import held_section, identification_report
 
         config, recording = self.job.config, without_touches(self.recording)
         after = compare_recording(recording, self.model, config.step, floor=found.floor)
         write_comparison(after, folder / "identification.rrd")
-        held = contact_sections(self.contact, alone=False) if self.contact else []
+        held = [held_section(self.contact.errors, self.contact.joint_errors)] if self.contact else []
         stages, joints = self.data["error"], self.data["joints"]
         return identification_report(after, stages, joints, self.job.command, path, held)
 

@@ -159,8 +159,10 @@ def run_training(job: Job, stage: str = "", later: int = 0) -> TrainingResult:
     if before is not None:
         print(f"{job.folder}: finished before ({before.reason}); training.resume=never starts over")
         return TrainingResult(job.folder, before.reason, before.steps, before.final_angle)
-    if job.config.stages:
-        return _in_stages(job, plain)
+    return _in_stages(job, plain) if job.config.stages else _in_one(job, plain, stage, later)
+
+
+def _in_one(job: Job, plain: dict[str, Any], stage: str, later: int) -> TrainingResult:
     start = partial(_training_run, job, plain, stage, later)
     run, reason = train_on(start, partial(start, resume="auto"))  # what starts over does so once
     return TrainingResult(job.folder, reason, run.learner.steps, float(run.learner.episodes.mean_angle))

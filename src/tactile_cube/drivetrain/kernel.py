@@ -188,7 +188,7 @@ def kernel_source(topology: Topology, effects: Sequence[type[Effect]], layout: M
         for law in ("law", "torque_law", "ahead_law")
         if effect.defines(law)
     ]
-    stages = [_stage(stage, effects, layout) for stage in Stage if stage is not Stage.MECHANISM]
+    stages = [_stage(stage, effects, layout) for stage in Stage if stage.value >= 0]
     return _HEADER + "\n".join([*_constants(topology, layout), *laws, *stages, _ahead(effects, layout)])
 
 

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from tactile_cube.drivetrain.model_file import EffectEstimate
+from tactile_cube.identification.criteria import Criteria
 from tactile_cube.identification.diagnosis import Diagnosis
 from tactile_cube.identification.fitting.intervals import Fitted, bounds
 from tactile_cube.identification.model_files import effect_estimate
 from tactile_cube.identification.next_experiment import FILE, Experiment
 from tactile_cube.identification.search.candidates import Candidate
 from tactile_cube.identification.search.explanation import Explanation
-from tactile_cube.identification.verdict import unexplained_joints
-from tactile_cube.measurement.replay.model import effect_path
+from tactile_cube.identification.search.findings import Findings
+from tactile_cube.identification.verdict import Unexplained, unexplained_joints
+from tactile_cube.measurement.replay.model import effect_label, effect_path
 
 RANKED = 20
 
@@ -22,20 +24,15 @@ def as_json(diagnosis: Diagnosis, seconds: float) -> dict[str, Any]:
     """The content of diagnosis.json; errors in rad."""
     verdict, experiment = diagnosis.verdict, diagnosis.experiment
     explanations = [(verdict.chosen, diagnosis.fitted), *diagnosis.rivals]
-    names = [_names(one) for one, _ in explanations]
-    effects = [
-        entry
-        for k, (one, fitted) in enumerate(explanations)
-        for entry in _effects(one, fitted, [n for m, other in enumerate(names) if m != k for n in other])
-    ]
+    effects = effect_entries(explanations)
     errors = diagnosis.errors().model_dump()
     joints = list(diagnosis.stages["nominal"].joints)
     return {
         "verdict": verdict.kind,
         "effects": effects if verdict.kind not in ("adequate", "unknown_effect") else [],
-        "sets": [list(dict.fromkeys(one)) for one in names] if diagnosis.rivals else [],
+        "sets": [names_of(one) for one, _ in explanations] if diagnosis.rivals else [],
         "unexplained_joints": unexplained_joints(verdict.chosen, tuple(joints)),
-        "ranking": ranking(diagnosis),
+        "ranking": ranking(diagnosis.findings, diagnosis.criteria),
         "error": {key: errors[key] for key in ("nominal", "refitted", "with_effects", "noise_floor")},
         "error_joints": errors["joints"],
         "noise_floor_source": diagnosis.floor.source,
@@ -49,7 +46,15 @@ def as_json(diagnosis: Diagnosis, seconds: float) -> dict[str, Any]:
         "error_over_noise": diagnosis.over_noise,
         "unexplained": [_unexplained(one) for one in diagnosis.unexplained],
         "partial_effects": effects if verdict.kind == "unknown_effect" else [],
-        "unproven_effects": _unproven(diagnosis),
+        "unproven_effects": [
+            {
+                "effects": names_of(one),
+                "heldout_gain": round(one.gain, 6),
+                "p_value": one.p_value,
+                "segments": int((one.judgement.samples > 0).sum()),
+            }
+            for one in diagnosis.unproven
+        ],
         "known_effects": list(diagnosis.known),
         "common_offsets": [asdict(one) for one in diagnosis.common],
         "left_out": [asdict(one) for one in diagnosis.left_out],
@@ -89,66 +94,51 @@ def safety_as_json(experiment: Experiment) -> dict[str, Any]:
     }
 
 
-def ranking(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """What was weighed: refitted explanations with held-out errors, then first-order scores."""
-    rows: list[dict[str, Any]] = [
-        {
-            "effects": " & ".join(_names(one)),
-            "held_out_error_over_noise": round(one.error, 4),
-            "gain": round(one.gain, 5),
-            "p_value": one.p_value,
-        }
-        for one in diagnosis.findings.proven(diagnosis.criteria)
-    ]
-    judged = {row["effects"] for row in rows}
-    for score in diagnosis.findings.scores[:RANKED]:
+def ranking(findings: Findings, criteria: Criteria) -> list[dict[str, Any]]:
+    """What was judged: refitted explanations with held-out errors, then laws of the first look."""
+    rows: dict[str, dict[str, Any]] = {}
+    for one in findings.proven(criteria):
+        numbers = {"gain": round(one.gain, 5), "p_value": one.p_value}
+        name = " & ".join(names_of(one))
+        rows.setdefault(name, {"effects": name, "held_out_error_over_noise": round(one.error, 4)} | numbers)
+    nothing = dict.fromkeys(("held_out_error_over_noise", "gain", "p_value"))
+    for score in findings.scores[:RANKED]:
         name = " & ".join(_label(score.candidate))
-        if name not in judged:
-            judged.add(name)
-            rows.append({"effects": name, "held_out_error_over_noise": None, "gain": None, "p_value": None})
-    return rows
-
-
-def _unproven(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    return [
-        {
-            "effects": _names(one),
-            "heldout_gain": round(one.gain, 6),
-            "p_value": one.p_value,
-            "segments": int((one.judgement.samples > 0).sum()),
-        }
-        for one in diagnosis.unproven
-    ]
+        rows.setdefault(name, {"effects": name} | nothing)
+    return list(rows.values())
 
 
 def _label(candidate: Candidate) -> list[str]:
-    return [f"{effect_path(candidate.effect)}@{joint}" for joint in candidate.joints]
+    return [effect_label(candidate.effect, joint) for joint in candidate.joints]
 
 
-def _names(explanation: Explanation) -> list[str]:
-    return [name for candidate in explanation.effects for name in _label(candidate)]
+def names_of(explanation: Explanation) -> list[str]:
+    """NAME@JOINT of each effect."""
+    return list(dict.fromkeys(name for candidate in explanation.effects for name in _label(candidate)))
 
 
-def _effects(explanation: Explanation, fitted: Fitted, rivals: list[str]) -> list[dict[str, Any]]:
-    known = bounds(fitted)
+def effect_entries(explanations: Sequence[tuple[Explanation, Fitted]]) -> list[dict[str, Any]]:
+    """The effects of the chosen explanation and of its rivals, each with what cannot be told from it."""
     entries = []
-    first = len(fitted.model.terms) - explanation.terms
-    for place, term in enumerate(fitted.model.terms[first:], start=first):
-        estimate: EffectEstimate = effect_estimate(term, place, known)
-        entries.append(
-            {
-                "name": effect_path(term.effect),
-                "joints": [term.joint],
-                "parameters": {key: estimate.parameters[key].model_dump() for key in term.fitted},
-                "heldout_gain": round(explanation.gain, 6),
-                "p_value": explanation.p_value,
-                "rivals": [name for name in rivals if name != term.label],
-            }
-        )
+    for one, fitted in explanations:
+        known, first = bounds(fitted), len(fitted.model.terms) - one.terms
+        rivals = [name for other, _ in explanations if other is not one for name in names_of(other)]
+        for place, term in enumerate(fitted.model.terms[first:], start=first):
+            estimate = effect_estimate(term, place, known)
+            entries.append(
+                {
+                    "name": effect_path(term.effect),
+                    "joints": [term.joint],
+                    "parameters": {key: estimate.parameters[key].model_dump() for key in term.fitted},
+                    "heldout_gain": round(one.gain, 6),
+                    "p_value": one.p_value,
+                    "rivals": [name for name in rivals if name != term.label],
+                }
+            )
     return entries
 
 
-def _unexplained(one: Any) -> dict[str, Any]:
+def _unexplained(one: Unexplained) -> dict[str, Any]:
     best = one.shapes[0] if one.shapes else None
     return {
         "joint": one.joint,

@@ -68,16 +68,19 @@ def disturbances(search: Search, recording: Recording, model: Model) -> list[Dis
     problem.linearise_starts(found)
     errors = segment_errors(problem, judge(problem, recording, found).residual)
     usual = np.maximum(np.nanquantile(errors, USUAL, axis=0), 1.0)
-    by_trial = _by_trial(problem, errors, len(recording.trials))
+    by_trial, rows = _by_trial(problem, errors, len(recording.trials)), problem.windows.segment
     found_in = []
-    for index, own in enumerate(by_trial):
+    for index, (trial, own) in enumerate(zip(recording.trials, by_trial, strict=True)):
         failing = np.flatnonzero((own > STANDS_OUT * usual).any(axis=1))
         others = [(by_trial[k], lag) for k, lag in repeats_of(recording.trials, index)] if len(failing) else []
-        failing = np.array([k for k in failing if not _shared(own, int(k), others, problem.windows.segment)], dtype=int)
-        found_in += [
-            _described(recording, index, stretch, own, usual, problem.windows.segment, len(others))
-            for stretch in _stretches(failing)
-        ]
+        failing = np.array([k for k in failing if not _shared(own, int(k), others, rows)], dtype=int)
+        for first, last in _stretches(failing):
+            mean = np.sqrt(np.nanmean(own[first : last + 1] ** 2, axis=0))
+            joint = int(np.nanargmax(mean / usual))
+            start = max((first - 1) * rows * trial.step, 0.0)
+            end = min((last + 2) * rows * trial.step, trial.duration + trial.step)
+            sizes = float(mean[joint]), float(usual[joint])
+            found_in.append(Disturbance(trial.name, start, end, recording.joints[joint], *sizes, len(others)))
     return found_in
 
 
@@ -125,24 +128,6 @@ def _stretches(failing: NDArray[np.int64]) -> list[tuple[int, int]]:
         return []
     edges = np.flatnonzero(np.diff(failing) > 2)
     return [(int(part[0]), int(part[-1])) for part in np.split(failing, edges + 1)]
-
-
-def _described(
-    recording: Recording, index: int, stretch: tuple[int, int], own: Array, usual: Array, rows: int, repeats: int
-) -> Disturbance:
-    trial = recording.trials[index]
-    errors = np.sqrt(np.nanmean(own[stretch[0] : stretch[1] + 1] ** 2, axis=0))
-    joint = int(np.nanargmax(errors / usual))
-    start, end = (stretch[0] - 1) * rows * trial.step, (stretch[1] + 2) * rows * trial.step
-    return Disturbance(
-        trial.name,
-        max(start, 0.0),
-        min(end, trial.duration + trial.step),
-        recording.joints[joint],
-        float(errors[joint]),
-        float(usual[joint]),
-        repeats,
-    )
 
 
 SEGMENTS = 32  # that tell them apart

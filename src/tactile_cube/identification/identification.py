@@ -81,10 +81,7 @@ def identify_effects(
     Raises:
         InputError: an unknown effect, joint or parameter, or nothing to hold out.
     """
-    named = [_with_parameters(text) for text in effects]
-    wanted = [(*place, parameters) for text, parameters in named for place in resolve([text], recording.joints)]
-    for effect, joint, parameters in wanted:
-        _check_parameters(effect, joint, parameters)
+    wanted = [one for text in effects for one in _wanted(text, recording.joints)]
     classes = tuple(dict.fromkeys(effect for effect, *_ in wanted))
     search, floor = divided(recording, classes, seed, say)
     held_out, base = search.held_out, search.base
@@ -134,37 +131,28 @@ def judge_known(recording: Recording, model: ModelFile, seed: int = 0) -> Judgem
 
 
 def divided(
-    recording: Recording,
-    effects: Sequence[type[Effect]],
-    seed: int,
-    say: Callable[[str], None],
-    known: ModelFile | None = None,
+    recording: Recording, effects: Sequence[type[Effect]], seed: int, say: Callable[[str], None]
 ) -> tuple[Search, NoiseFloor]:
-    """Return the trials to fit and those to judge by, with the effects compiled in, and the noise floor.
-
-    `known` is the model to begin with; None: what the recording's owner states.
-    """
-    recording = in_time(resolved(recording, effects, say, known), effects, say, known)
+    """Return the trials to fit and those to judge by, with the effects compiled in, and the noise floor."""
+    recording = in_time(resolved(recording, effects, say, None), effects, say)
     fitted, held_out = held_out_split(recording, seed=seed)
-    return Search(fitted, held_out, noise_with_links(recording), effects, say, known), noise_floor(recording)
+    return Search(fitted, held_out, noise_with_links(recording), effects, say), noise_floor(recording)
 
 
-def _with_parameters(text: str) -> tuple[str, tuple[str, ...]]:
-    """NAME@JOINT, and the parameters that were named in brackets behind the effect or the joint."""
+def _wanted(text: str, joints: Sequence[str]) -> list[tuple[type[Effect], str, tuple[str, ...]]]:
+    """Effects, joints and the parameters that were named in brackets behind the effect or the joint."""
     found = re.search(r"\(([^()]*)\)", text)
-    if found is None:
-        return text, ()
-    return text.replace(found.group(), ""), tuple(name.strip() for name in found.group(1).split(",") if name.strip())
-
-
-def _check_parameters(effect: type[Effect], joint: str, parameters: Sequence[str]) -> None:
-    known = [parameter.name for parameter in effect.parameters]
-    for name in parameters:
-        if name not in known:
-            raise InputError(
-                f"effects: '{effect.name}@{joint}({name})': '{name}' is none of its parameters ({', '.join(known)})"
-                f"{suggestion(name, known)}"
-            )
+    names = tuple(filter(None, (name.strip() for name in found.group(1).split(",")))) if found else ()
+    placed = resolve([text.replace(found.group(), "") if found else text], joints)
+    for effect, joint in placed:
+        known = [parameter.name for parameter in effect.parameters]
+        for name in names:
+            if name not in known:
+                raise InputError(
+                    f"effects: '{effect.name}@{joint}({name})': '{name}' is none of its parameters "
+                    f"({', '.join(known)}){suggestion(name, known)}"
+                )
+    return [(effect, joint, names) for effect, joint in placed]
 
 
 def with_effect(search: Search, frozen: Fit, effect: type[Effect], joint: str, parameters: Sequence[str] = ()) -> Fit:

@@ -7,7 +7,7 @@ from typing import Any
 
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.next_experiment import FILE, Experiment
-from tactile_cube.identification.safe_commands import QUANTITIES, SCALES, TRIALS, Envelope, Safety
+from tactile_cube.identification.safe_commands import QUANTITIES, SCALES, TRIALS
 from tactile_cube.measurement.comparing.repeats import Drift
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.units import TURNS, common_unit, milli, of_joint, short
@@ -25,22 +25,18 @@ NO_LAW, LEFT = 0.05, 2.0  # share that a black box explains of what follows no l
 FAR = 0.2  # part of a stated constant by which a fitted one may differ without a word
 PARTIAL = "Some effects reduce the error, but more is missing."
 UNPROVEN = "Something is missing, but these trials are too few to prove what."
-GAIN_OF = {"error": "the held-out error", "offsets": "the joint offsets that the grips need"}
 HELD = "Nothing is missing that these grasps show: the world follows them about as well as one with the true effects."
 
 
 def answer(result: dict[str, Any], experiment: Experiment | None, constants: Sequence[str] = ()) -> str:
     """A few lines for the terminal, from the content of diagnosis.json; `constants` are said to be stated otherwise."""
     units = result.get("shown_in", result.get("units", {}))
-    grasps = result.get("noise_floor_source") == "contact"
-    unproven = result.get("unproven_effects")
-    opening = (
-        UNPROVEN
-        if unproven and result["verdict"] == "unknown_effect"
-        else HELD
-        if grasps and result["verdict"] == "adequate"
-        else headline(result)
-    )
+    grasps, unproven = result.get("noise_floor_source") == "contact", result.get("unproven_effects")
+    opening = headline(result)
+    if unproven and result["verdict"] == "unknown_effect":
+        opening = UNPROVEN
+    elif grasps and result["verdict"] == "adequate":
+        opening = HELD
     lines = [f"{opening}{left_over(result)}"]
     lines += [_effect(entry, units) for entry in result["effects"]]
     lines += [f"  That is either {sets_in_words(result['sets'])}."] if result.get("sets") else []
@@ -80,22 +76,15 @@ def answer(result: dict[str, Any], experiment: Experiment | None, constants: Seq
 def restated(recording: Recording, model: ModelFile) -> list[str]:
     """Constants whose interval leaves out what the owner states, and which are far from it."""
     lines = []
-    for key, by_joint in model.values.items():
-        for joint, one in by_joint.items():
-            stated = recording.stated(key, joint)
-            fitted = one.low < one.high
-            if (
-                not fitted
-                or stated is None
-                or one.low <= stated <= one.high
-                or abs(one.value - stated) <= FAR * abs(stated)
-            ):
-                continue
+    for key, joint, one in ((key, joint, one) for key, row in model.values.items() for joint, one in row.items()):
+        stated = recording.stated(key, joint)
+        if stated is None or not one.low < one.high or one.low <= stated <= one.high:
+            continue
+        if abs(one.value - stated) > FAR * abs(stated):
             unit = of_joint(one.unit, recording.units[joint])
             also = ", or viscous friction beside it" if key == "kd" else ""
-            lines.append(
-                f"{key} at {joint} {one.value:.4g} [{one.low:.4g}, {one.high:.4g}], not {stated:.4g} {unit}{also}"
-            )
+            interval = f"[{one.low:.4g}, {one.high:.4g}]"
+            lines.append(f"{key} at {joint} {one.value:.4g} {interval}, not {stated:.4g} {unit}{also}")
     return lines
 
 
@@ -135,13 +124,17 @@ def sets_in_words(sets: Sequence[Sequence[str]]) -> str:
     return ", or ".join(" and ".join(names) for names in sets)
 
 
+def values_in_words(parameters: Mapping[str, Mapping[str, Any]], unit: str) -> str:
+    """Values with intervals, at a joint of that unit."""
+    return ", ".join(
+        f"{name} {one['value']:.4g} [{one['low']:.4g}, {one['high']:.4g}] {of_joint(one['unit'], unit)}"
+        for name, one in parameters.items()
+    )
+
+
 def _effect(entry: dict[str, Any], units: Mapping[str, str]) -> str:
     own = common_unit(units[joint] for joint in entry["joints"] if joint in units)
-    values = ", ".join(
-        f"{name} {one['value']:.4g} [{one['low']:.4g}, {one['high']:.4g}] {of_joint(one['unit'], own)}"
-        for name, one in entry["parameters"].items()
-    )
-    return f"  {entry['name']} at {', '.join(entry['joints'])}: {values}"
+    return f"  {entry['name']} at {', '.join(entry['joints'])}: {values_in_words(entry['parameters'], own)}"
 
 
 def _unexplained(entry: dict[str, Any]) -> str:
@@ -214,12 +207,8 @@ def errors_by_stage(stages: Mapping[str, float], model: ModelFile, units: Mappin
     lines = ["Held-out error, free-running simulation:"]
     lines += [f"  {stage.replace('_', ' '):<40} {milli(value, unit)}" for stage, value in stages.items()]
     for effect in model.effects:
-        fitted = {name: one for name, one in effect.parameters.items() if one.high > one.low}
-        values = ", ".join(
-            f"{n} {e.value:.4g} [{e.low:.4g}, {e.high:.4g}] {of_joint(e.unit, units.get(effect.joint or '', TURNS))}"
-            for n, e in fitted.items()
-        )
-        lines.append(f"{effect.effect}: {values}")
+        fitted = {name: one.model_dump() for name, one in effect.parameters.items() if one.high > one.low}
+        lines.append(f"{effect.effect}: {values_in_words(fitted, units.get(effect.joint or '', TURNS))}")
     return "\n".join(lines)
 
 
@@ -228,12 +217,7 @@ PLENTY = 100.0  # times the evidence that is needed: how much more is of no use 
 
 
 def next_steps(experiment: Experiment, units: Mapping[str, str]) -> list[str]:
-    """What to play to decide, when to stop it, and between what nothing that can be played decides.
-
-    Args:
-        experiment: the commands and what models make of them.
-        units: joint -> unit of its position.
-    """
+    """What to play to decide, when to stop it, and between what nothing that can be played decides."""
     beyond = "stop beyond" if experiment.safety.safe else "allowed"
     lines = [
         f"  {joint}: {position}, {speed}, {torque}; {beyond} {', '.join(bounds)}"
@@ -244,107 +228,75 @@ def next_steps(experiment: Experiment, units: Mapping[str, str]) -> list[str]:
 
 def proposal(experiment: Experiment) -> list[str]:
     """What to play, or that nothing is safe or nothing decides."""
-    if not experiment.safety.safe:
-        return [_nothing_safe(experiment)]
+    safety, seconds = experiment.safety, _seconds(experiment)
+    size = "" if safety.scale == 1.0 else f" at {_percent(safety.scale)} of full size"
+    command = f"{experiment.name}{size}, {seconds}"
+    if not safety.safe:
+        return [
+            f"No safe command was found: each kind, down to {_percent(SCALES[-1])} of its size, leaves the limits in "
+            f"at least one of {safety.models} models ({MODELS}). What {command}, reach in the first model that leaves "
+            "them:"
+        ]
     lines = [
         f"No command tried separates {one} from {other}: within its limits the machine moves alike either way."
         for one, other in experiment.inseparable
     ]
-    return [*lines, _play(experiment), _simulated(experiment)] if experiment.decides else lines
+    if not experiment.decides:
+        return lines
+    told = short(experiment.told, 2) if experiment.told < PLENTY else f"more than {PLENTY:g}"
+    starts = f" from {len(safety.starts)} starts" if len(safety.starts) > 1 else ""
+    return [
+        *lines,
+        f"To decide, play {FILE} twice, add both trials and diagnose again: {command}. Each should give {told} times "
+        "the evidence needed to reject the wrong one, however it is refitted.",
+        f"Simulated for the whole {seconds} in {safety.models} models ({MODELS}){starts}. The largest values in any of "
+        f"them, and where to stop: {_percent(safety.margin)} inside stated limits, else where the trials ended:",
+    ]
 
 
 def joint_rows(experiment: Experiment, units: Mapping[str, str]) -> list[tuple[str, ...]]:
     """Joint; furthest position, speed and torque in any model; the same of what is allowed, with who says so."""
-    safety = experiment.safety
-    if safety.safe and not experiment.decides:
-        return []
-    return [
-        (
-            joint,
-            *_numbers(safety.reached, j, units.get(joint, TURNS)),
-            *(
-                f"{number} ({safety.limits.sources[key][j]})"
-                for key, number in zip(QUANTITIES, _numbers(safety.allowed, j, units.get(joint, TURNS)), strict=True)
-            ),
+    safety, rows = experiment.safety, list[tuple[str, ...]]()
+    for j, joint in enumerate(experiment.joints if experiment.decides or not safety.safe else ()):
+        unit = units.get(joint, TURNS)
+        reached, allowed = (
+            (
+                f"{short(envelope.low[j])} to {short(envelope.high[j])} {unit}",
+                f"{short(envelope.speed[j])} {unit}/s",
+                f"{short(envelope.torque[j])} {of_joint('N m', unit)}",
+            )
+            for envelope in (safety.reached, safety.allowed)
         )
-        for j, joint in enumerate(experiment.joints)
-    ]
+        sources = [safety.limits.sources[key][j] for key in QUANTITIES]
+        rows.append((joint, *reached, *(f"{one} ({by})" for one, by in zip(allowed, sources, strict=True))))
+    return rows
 
 
 def watch_for(experiment: Experiment, units: Mapping[str, str]) -> list[str]:
     """What to watch for; what would help where nothing is safe, or nothing that is safe decides."""
     safety = experiment.safety
-    if experiment.decides:
-        return [_watch(experiment, units), *([_open_loop(experiment)] if safety.open_loop else [])]
-    return [_help(safety)] if safety.open_loop or not safety.safe else []
-
-
-def _play(experiment: Experiment) -> str:
-    told = short(experiment.told, 2) if experiment.told < PLENTY else f"more than {PLENTY:g}"
-    return (
-        f"To decide, play {FILE} twice, add both trials and diagnose again: {_named(experiment)}, "
-        f"{_seconds(experiment)}. Each should give {told} times the evidence needed to reject the "
-        "wrong one, however it is refitted."
-    )
-
-
-def _simulated(experiment: Experiment) -> str:
-    safety = experiment.safety
-    starts = f" from {len(safety.starts)} starts" if len(safety.starts) > 1 else ""
-    return (
-        f"Simulated for the whole {_seconds(experiment)} in {safety.models} models ({MODELS}){starts}. The largest "
-        f"values in any of them, and where to stop: {_percent(safety.margin)} inside stated limits, else where the "
-        "trials ended:"
-    )
-
-
-def _watch(experiment: Experiment, units: Mapping[str, str]) -> str:
+    if not experiment.decides:
+        unstated = [key for key in QUANTITIES if TRIALS in safety.limits.sources[key]]
+        ways = [
+            *(["control the position instead of playing torques open loop"] if safety.open_loop else []),
+            "record shorter runs that start nearer the middle of the range",
+            *([f"state limits of {' and '.join(unstated)} (URDF, controller)"] if unstated else []),
+        ]
+        return [f"What would help: {'; '.join(ways)}."] if safety.open_loop or not safety.safe else []
     begin = ", ".join(
         f"{joint} {short(float(value))} {units.get(joint, TURNS)}"
-        for joint, value in zip(experiment.joints, experiment.safety.starts[-1], strict=True)
+        for joint, value in zip(experiment.joints, safety.starts[-1], strict=True)
     )
-    return (
+    lines = [
         f"Begin at rest at {begin}. Keep a hand on the emergency stop. Stop when a joint goes beyond these limits, "
         "moves against its command or shakes: then none of these models is right."
-    )
-
-
-def _open_loop(experiment: Experiment) -> str:
-    return (
-        f"These commands are torques or forces, open loop for {_seconds(experiment)}, and unstable by nature: small "
-        "errors add up. If you can, control the position instead and log the torque."
-    )
-
-
-def _nothing_safe(experiment: Experiment) -> str:
-    return (
-        f"No safe command was found: each kind, down to {_percent(SCALES[-1])} of its size, leaves the limits in at "
-        f"least one of {experiment.safety.models} models ({MODELS}). What {_named(experiment)}, "
-        f"{_seconds(experiment)}, reach in the first model that leaves them:"
-    )
-
-
-def _help(safety: Safety) -> str:
-    unstated = [key for key in QUANTITIES if TRIALS in safety.limits.sources[key]]
-    ways = [
-        *(["control the position instead of playing torques open loop"] if safety.open_loop else []),
-        "record shorter runs that start nearer the middle of the range",
-        *([f"state limits of {' and '.join(unstated)} (URDF, controller)"] if unstated else []),
     ]
-    return f"What would help: {'; '.join(ways)}."
-
-
-def _numbers(envelope: Envelope, joint: int, unit: str) -> tuple[str, str, str]:
-    return (
-        f"{short(envelope.low[joint])} to {short(envelope.high[joint])} {unit}",
-        f"{short(envelope.speed[joint])} {unit}/s",
-        f"{short(envelope.torque[joint])} {of_joint('N m', unit)}",
-    )
-
-
-def _named(experiment: Experiment) -> str:
-    scale = experiment.safety.scale
-    return experiment.name if scale == 1.0 else f"{experiment.name} at {_percent(scale)} of full size"
+    if safety.open_loop:
+        lines.append(
+            f"These commands are torques or forces, open loop for {_seconds(experiment)}, and unstable by nature: "
+            "small errors add up. If you can, control the position instead and log the torque."
+        )
+    return lines
 
 
 def _percent(part: float) -> str:

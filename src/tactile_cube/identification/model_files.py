@@ -13,7 +13,7 @@ from scipy import stats
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelErrors, ModelFile, Provenance
 from tactile_cube.identification.fitting.intervals import NORMAL_95, Fitted, bounds
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.model import Model, Term
+from tactile_cube.measurement.replay.model import Term
 from tactile_cube.measurement.replay.nominal import CONTROLLER, nominal_model
 
 UNITS = {
@@ -32,15 +32,23 @@ Known = Mapping[tuple[str, str, int, int], tuple[float, float, float]]
 def model_file(
     recording: Recording, fitted: Fitted, errors: ModelErrors, held_out: list[str], command: str, seed: int
 ) -> ModelFile:
-    """Everything that was identified on a recording."""
-    known = bounds(fitted)
-    joints = list(recording.joints)
+    """Everything that was identified on a recording; an offset is measured minus true, over all initialisations."""
+    known, model, offsets = bounds(fitted), fitted.model, dict[str, Estimate]()
+    for j, joint in enumerate(recording.joints):
+        found = [-float(one[j]) for one in model.offsets.values()]
+        offsets[joint] = Estimate(value=float(np.mean(found)), low=min(found), high=max(found), unit="rad")
     return ModelFile(
         rig=recording.name,
-        joints=joints,
-        values={key: _constants(fitted.model, key, joints, known) for key in UNITS},
-        effects=[effect_estimate(term, place, known) for place, term in enumerate(fitted.model.terms)],
-        offsets={joint: _offset(fitted.model, j) for j, joint in enumerate(joints)},
+        joints=list(recording.joints),
+        values={
+            key: {
+                joint: _estimate(float(model.constants[key][j]), known.get(("constant", key, j, 0)), unit)
+                for j, joint in enumerate(recording.joints)
+            }
+            for key, unit in UNITS.items()
+        },
+        effects=[effect_estimate(term, place, known) for place, term in enumerate(model.terms)],
+        offsets=offsets,
         provenance=_provenance(recording, held_out, command, seed),
         errors=errors,
     )
@@ -79,23 +87,9 @@ def effect_estimate(term: Term, place: int, known: Known) -> EffectEstimate:
     return EffectEstimate(effect=term.label, parameters=parameters)
 
 
-def _constants(model: Model, key: str, joints: list[str], known: Known) -> dict[str, Estimate]:
-    values = model.constants[key]
-    return {
-        joint: _estimate(float(values[j]), known.get(("constant", key, j, 0)), UNITS[key])
-        for j, joint in enumerate(joints)
-    }
-
-
 def _estimate(value: float, interval: tuple[float, float, float] | None, unit: str) -> Estimate:
     low, high = interval[1:] if interval else (value, value)
     return Estimate(value=value, low=low, high=high, unit=unit)
-
-
-def _offset(model: Model, joint: int) -> Estimate:
-    """Joint offset (measured minus true angle), its interval spanning the initialisations."""
-    offsets = [-float(one[joint]) for one in model.offsets.values()]
-    return Estimate(value=float(np.mean(offsets)), low=min(offsets), high=max(offsets), unit="rad")
 
 
 @dataclass(frozen=True)
@@ -134,9 +128,9 @@ def drifts(before: ModelFile, now: ModelFile) -> list[Drift]:
 
     Joint offsets are left out: they are others after each initialisation of a robot.
     """
-    known = dict(_estimates(before))
-    pairs = [Drift(name, known[name], one) for name, one in _estimates(now) if name in known]
-    return sorted((one for one in pairs if one.half_width > 0.0), key=lambda one: one.p_value)
+    known, found = ({name: one for name, one in _estimates(model) if one.high > one.low} for model in (before, now))
+    pairs = [Drift(name, known[name], one) for name, one in found.items() if name in known]
+    return sorted(pairs, key=lambda one: one.p_value)
 
 
 def changed(found: list[Drift], significance: float) -> list[Drift]:
@@ -146,6 +140,6 @@ def changed(found: list[Drift], significance: float) -> list[Drift]:
 
 def _estimates(model: ModelFile) -> Iterator[tuple[str, Estimate]]:
     for key, joints in model.values.items():
-        yield from ((f"{key}@{joint}", one) for joint, one in joints.items() if one.high > one.low)
+        yield from ((f"{key}@{joint}", one) for joint, one in joints.items())
     for effect in model.drive_effects:
-        yield from ((f"{effect.effect}: {key}", one) for key, one in effect.parameters.items() if one.high > one.low)
+        yield from ((f"{effect.effect}: {key}", one) for key, one in effect.parameters.items())

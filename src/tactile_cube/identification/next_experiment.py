@@ -94,7 +94,7 @@ def next_experiment(
         extended: the others are the first one and an effect more, which no trial speaks against that shows no such
             effect: all that counts is whether it would show.
     """
-    motions = PossibleMotions.of_fits(shooting, recording, list(rivals.values()), criteria.margin)
+    motions = PossibleMotions(shooting, recording, list(rivals.values()), criteria.margin)
     proposed = motions.safe_trials(seed)
     safe = [(trial, safety) for trial, safety in proposed if safety.safe]
     if not safe:

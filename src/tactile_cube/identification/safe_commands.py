@@ -55,6 +55,11 @@ class Envelope:
         )
         return cls(low.min(axis=0), high.max(axis=0), speed.max(axis=0), torque.max(axis=0))
 
+    @property
+    def middle_and_half(self) -> tuple[Array, Array]:
+        """Of the range of positions [rad]."""
+        return 0.5 * (self.low + self.high), 0.5 * (self.high - self.low)
+
     def of_joint(self, joint: int) -> dict[str, float | None]:
         """The plain numbers of one joint; None where a simulation ran away."""
         numbers = {key: float(getattr(self, key)[joint]) for key in ("low", "high", "speed", "torque")}
@@ -78,22 +83,15 @@ class Limits:
         position, speed, torque = (
             1.0 - margin * np.array([source != TRIALS for source in self.sources[key]]) for key in QUANTITIES
         )
-        middle, half = _middle_and_half(self.largest)
-        return Envelope(
-            middle - position * half, middle + position * half, speed * self.largest.speed, torque * self.largest.torque
-        )
+        most, (middle, half) = self.largest, self.largest.middle_and_half
+        return Envelope(middle - position * half, middle + position * half, speed * most.speed, torque * most.torque)
 
 
 def share_used(reached: Envelope, allowed: Envelope) -> float:
     """The largest part of what is allowed that a motion uses; infinite where a simulation ran away."""
-    middle, half = _middle_and_half(allowed)
-    used = [
-        _part(np.abs(reached.low - middle), half),
-        _part(np.abs(reached.high - middle), half),
-        _part(reached.speed, allowed.speed),
-        _part(reached.torque, allowed.torque),
-    ]
-    largest = float(np.max(used))
+    middle, half = allowed.middle_and_half
+    used = np.array([np.abs(reached.low - middle), np.abs(reached.high - middle), reached.speed, reached.torque])
+    largest = float(np.max(used / np.maximum([half, half, allowed.speed, allowed.torque], np.finfo(float).tiny)))
     return largest if np.isfinite(largest) else np.inf
 
 
@@ -104,19 +102,20 @@ def within_limits(reached: Envelope, limits: Limits, margin: float) -> bool:
 
 def limits_of(recording: Recording) -> Limits:
     """The limits that URDF and controller state, and where they state none what the trials reached."""
+    kp, driven = recording.gains.kp, recording.torque_controlled
     shown = Envelope.around(
         Envelope(
             trial.position.min(axis=0),
             trial.position.max(axis=0),
             np.abs(trial.velocity()).max(axis=0),
-            np.abs(_asked(recording, trial.command, trial.position)).max(axis=0),
+            np.abs(trial.command if driven else kp * (trial.command - trial.position)).max(axis=0),
         )
         for trial in recording.trials
     )
     joints = [recording.rig.joints[joint] for joint in recording.joints]
-    low, high = np.array([(joint.lower, joint.upper) for joint in joints]).T
-    speed = _stated([joint.velocity for joint in joints], shown.speed)
-    effort = _stated([joint.effort for joint in joints], shown.torque)
+    low, high, speed, effort = np.array([(one.lower, one.upper, one.velocity, one.effort) for one in joints]).T
+    speed = np.where(speed < FILLER * shown.speed, speed, np.inf)
+    effort = np.where(effort < FILLER * shown.torque, effort, np.inf)
     torque = np.minimum(np.where(recording.gains.torque_limit > 0.0, recording.gains.torque_limit, np.inf), effort)
     bounded = np.array([joint.bounds == (joint.lower, joint.upper) for joint in joints]) & (high > low)
     largest = Envelope(
@@ -126,32 +125,11 @@ def limits_of(recording: Recording) -> Limits:
         np.where(np.isfinite(torque), torque, shown.torque),
     )
     sources = {
-        "position": _sources(np.where(bounded, "URDF", TRIALS)),
-        "speed": _sources(np.where(np.isfinite(speed), "URDF", TRIALS)),
-        "torque": _sources(np.select([~np.isfinite(torque), torque < effort], [TRIALS, "controller"], "URDF")),
+        "position": np.where(bounded, "URDF", TRIALS),
+        "speed": np.where(np.isfinite(speed), "URDF", TRIALS),
+        "torque": np.select([~np.isfinite(torque), torque < effort], [TRIALS, "controller"], "URDF"),
     }
-    return Limits(largest, sources)
-
-
-def _asked(recording: Recording, command: Array, position: Array) -> Array:
-    return command if recording.torque_controlled else np.asarray(recording.gains.kp * (command - position))
-
-
-def _stated(limits: list[float], shown: Array) -> Array:
-    """Limits (n,), infinite where a number only fills the field."""
-    return np.where(np.array(limits) < FILLER * shown, limits, np.inf)
-
-
-def _sources(chosen: NDArray[np.str_]) -> tuple[str, ...]:
-    return tuple(str(one) for one in chosen)
-
-
-def _middle_and_half(envelope: Envelope) -> tuple[Array, Array]:
-    return 0.5 * (envelope.low + envelope.high), 0.5 * (envelope.high - envelope.low)
-
-
-def _part(used: Array, allowed: Array) -> Array:
-    return np.asarray(used / np.maximum(allowed, np.finfo(float).tiny))
+    return Limits(largest, {key: tuple(map(str, chosen)) for key, chosen in sources.items()})
 
 
 DURATION = 12.0  # [s] of a finger
@@ -167,24 +145,29 @@ def excitations(recording: Recording, seed: int, unit: float = 1.0) -> dict[str,
 
     Args:
         recording: what has been played so far.
-        seed: of phases and postures.
+        seed: of phases and levels.
         unit: what a second of a finger stands for [s].
     """
-    everything, middle = _commands(recording), middle_command(recording)
+    everything, middle = np.concatenate([trial.command for trial in recording.trials]), middle_command(recording)
     half = np.maximum(np.minimum(everything.max(axis=0) - middle, middle - everything.min(axis=0)), 0.0)
     fastest = np.max([np.abs(np.diff(trial.command, axis=0)).max(axis=0) for trial in recording.trials], axis=0)
     time: Array = np.arange(round(DURATION * unit / recording.step), dtype=np.float64) * recording.step / unit
-    waves = _waves(time, recording, np.random.default_rng(seed))
+    waves = _waves(time[:, None], recording, np.random.default_rng(seed))
     if recording.torque_controlled:
         driven = (time > 0.0) & (time < DRIVEN * time[-1])
         waves = {kind: wave * driven[:, None] for kind, wave in waves.items()}
-    return {kind: _limited(middle + half * wave, FASTEST * fastest) for kind, wave in waves.items()}
+    commands = {kind: middle + half * wave for kind, wave in waves.items()}
+    for command in commands.values():
+        for k in range(1, len(command)):
+            change = command[k] - command[k - 1]
+            command[k] = command[k - 1] + np.clip(change, -FASTEST * fastest, FASTEST * fastest)
+    return commands
 
 
 def middle_command(recording: Recording) -> Array:
     """The command (n,) about which to move: mid-range, or the torque that carries the links where they begin."""
     if not recording.torque_controlled:
-        everything = _commands(recording)
+        everything = np.concatenate([trial.command for trial in recording.trials])
         return np.asarray(0.5 * (everything.min(axis=0) + everything.max(axis=0)))
     tree = recording.rigid_body()
     posture, still = tree.expand(recording.trials[-1].position[0]), np.zeros(tree.dofs)
@@ -192,49 +175,29 @@ def middle_command(recording: Recording) -> Array:
 
 
 def _waves(time: Array, recording: Recording, rng: np.random.Generator) -> dict[str, Array]:
-    joints, time = len(recording.joints), time[:, None]
+    """Commands between -1 and 1 at times (T, 1) [s] of a finger."""
+    joints = len(recording.joints)
     phases = rng.uniform(0.0, 2.0 * np.pi, joints)
     if recording.torque_controlled:
-        phases = 0.5 * np.pi * _first_push(recording)
-    turns, growing = phases / (2.0 * np.pi), time / time[-1]
+        middle, _ = limits_of(recording).largest.middle_and_half
+        phases = 0.5 * np.pi * np.where(recording.trials[-1].position[0] < middle, 1.0, -1.0)
+    growing = time / time[-1]
+    levels = rng.uniform(-0.9, 0.9, (round(float(time[-1, 0])) + 1, joints))
+
+    def triangle(turns: Array) -> Array:
+        """With the signs and peaks of a sine."""
+        turns = turns + phases / (2.0 * np.pi) - 0.25
+        return np.asarray(1.0 - 4.0 * np.abs(turns - np.floor(turns + 0.5)))
+
     return {
-        "slow triangles": _triangle(time / 6.0 + turns),
-        "fast triangles": _triangle(time / 1.0 + turns),
-        "growing triangles": growing**2 * _triangle(time / 1.5 + turns),
-        "tiny triangles": 0.05 * _triangle(time / 2.0 + turns),
+        "slow triangles": triangle(time / 6.0),
+        "fast triangles": triangle(time / 1.0),
+        "growing triangles": growing**2 * triangle(time / 1.5),
+        "tiny triangles": 0.05 * triangle(time / 2.0),
         "growing steps": (0.1 + 0.9 * growing) * np.sign(np.sin(2 * np.pi * time / 1.6 + phases)),
         "rising frequency": 0.4 * np.sin(2 * np.pi * (0.2 * time + 0.3 * time**2) + phases),
-        "holds with small moves": _holds(time[:, 0], joints, rng),
+        "holds with small moves": levels[np.minimum(time[:, 0].astype(int), len(levels) - 1)],
     }
-
-
-def _first_push(recording: Recording) -> Array:
-    """Direction (n,) away from that end of its range at which a joint begins."""
-    limits, start = limits_of(recording).largest, recording.trials[-1].position[0]
-    return np.where(start < 0.5 * (limits.low + limits.high), 1.0, -1.0)
-
-
-def _commands(recording: Recording) -> Array:
-    return np.concatenate([trial.command for trial in recording.trials])
-
-
-def _triangle(turns: Array) -> Array:
-    """A triangle with the signs and peaks of a sine."""
-    turns = turns - 0.25
-    return np.asarray(1.0 - 4.0 * np.abs(turns - np.floor(turns + 0.5)))
-
-
-def _holds(time: Array, joints: int, rng: np.random.Generator) -> Array:
-    steps = rng.uniform(-0.9, 0.9, (round(time[-1]) + 1, joints))
-    return np.asarray(steps[np.minimum(time.astype(int), len(steps) - 1)])
-
-
-def _limited(command: Array, most: float) -> Array:
-    """Commands whose change from row to row stays within what is safe."""
-    safe = command.copy()
-    for k in range(1, len(safe)):
-        safe[k] = safe[k - 1] + np.clip(command[k] - safe[k - 1], -most, most)
-    return safe
 
 
 SCALES = [0.8**k for k in range(11)]  # of a command about its middle, down to a tenth
@@ -279,73 +242,52 @@ class Safety:
         return within_limits(self.reached, self.limits, self.margin)
 
 
-@dataclass(frozen=True)
 class PossibleMotions:
-    """What a command may make of a machine.
+    """What a command may make of a machine in models that may be true.
 
-    Attributes:
-        shooting: simulates the models.
-        recording: of the machine.
-        fits: models as fitted, simulated from every start.
-        ends: of each fit the models with numbers at either end of their intervals, simulated from the last start.
-        limits: of the machine.
-        margin: part of each stated limit that is kept free.
+    Fitted models are simulated from every start, those with numbers at either end of their intervals from the last.
     """
 
-    shooting: Shooting
-    recording: Recording
-    fits: list[Model]
-    ends: list[list[Model]]
-    limits: Limits
-    margin: float
-
-    @classmethod
-    def of_fits(cls, shooting: Shooting, recording: Recording, fits: Sequence[Fit], margin: float) -> PossibleMotions:
-        """The motions in models that may be true."""
-        zero = no_offsets(recording)
-        models = [fit.model.with_offsets(zero) for fit in fits]
-        ends = [[model.with_offsets(zero) for model in interval_ends(fit)] for fit in fits]
-        return cls(shooting, recording, models, ends, limits_of(recording), margin)
+    def __init__(self, shooting: Shooting, recording: Recording, fits: Sequence[Fit], margin: float) -> None:
+        """Simulates nothing yet; `margin` is the part of each stated limit that is kept free."""
+        self.shooting, self.recording, self.margin = shooting, recording, margin
+        zero, self.limits = no_offsets(recording), limits_of(recording)
+        self.fits = [fit.model.with_offsets(zero) for fit in fits]
+        self.ends = [[model.with_offsets(zero) for model in interval_ends(fit)] for fit in fits]
 
     def safe_trials(self, seed: int) -> list[tuple[Trial, Safety]]:
-        """Each excitation, scaled down until it stays within the limits, or as far as that goes."""
-        designed = excitations(self.recording, seed, self.shooting.time)
-        return [self._scaled(kind, commands) for kind, commands in designed.items()]
+        """Each excitation at the largest scale at which it stays within the limits, or the least of all.
 
-    def _scaled(self, kind: str, commands: Array) -> tuple[Trial, Safety]:
-        """The largest scale that is safe; where the least is not, those in between are not asked for."""
-        middle = middle_command(self.recording)
+        Where the least is not safe, those in between are not asked for.
+        """
+        middle, found = middle_command(self.recording), []
+        for kind, commands in excitations(self.recording, seed, self.shooting.time).items():
 
-        def at(scale: float) -> tuple[Trial, Safety]:
-            less = middle + scale * (commands - middle)
-            trial = trials_from_rest(self.recording, kind, less)[-1]
-            return replace(trial, initialisation=0), self.safety(kind, less, scale)
+            def at(scale: float, kind: str = kind, commands: Array = commands) -> tuple[Trial, Safety]:
+                less = middle + scale * (commands - middle)
+                trial = trials_from_rest(self.recording, kind, less)[-1]
+                return replace(trial, initialisation=0), self.safety(kind, less, scale)
 
-        largest, *between, least = SCALES
-        if (designed := at(largest))[1].safe:
-            return designed
-        smallest = at(least)
-        between = between if smallest[1].safe else []
-        return next((one for one in map(at, between) if one[1].safe), smallest)
+            largest, *between, least = SCALES
+            if not (one := at(largest))[1].safe and (one := at(least))[1].safe:
+                one = next((safe for safe in map(at, between) if safe[1].safe), one)
+            found.append(one)
+        return found
 
     def safety(self, kind: str, commands: Array, scale: float = 1.0) -> Safety:
         """What commands (T, n) do from rest, simulated freely until they end or a model leaves the limits."""
         trials = trials_from_rest(self.recording, kind, commands)
-        reached = Envelope.around(map(self._commanded, trials))
+        low, high, still = commands.min(axis=0), commands.max(axis=0), np.zeros(commands.shape[1])
+        reached = Envelope(low, high, still, still)
+        if open_loop := self.recording.torque_controlled:
+            reached = Envelope.around(Envelope.of_motion(t.position, t.command, t.step) for t in trials)
         for one in self._simulated(trials):
             reached = Envelope.around([reached, one])
             if not within_limits(reached, self.limits, self.margin):
                 break
         count = len(self.fits) + sum(map(len, self.ends))
-        open_loop = self.recording.torque_controlled
         starts = np.array([trial.position[0] for trial in trials])
         return Safety(self.limits, self.margin, reached, scale, count, starts, open_loop)
-
-    def _commanded(self, trial: Trial) -> Envelope:
-        if self.recording.torque_controlled:
-            return Envelope.of_motion(trial.position, trial.command, trial.step)
-        still = np.zeros(len(self.recording.joints))
-        return Envelope(trial.command.min(axis=0), trial.command.max(axis=0), still, still)
 
     def _simulated(self, trials: Sequence[Trial]) -> Iterator[Envelope]:
         """What each model does, fitted ones in every trial; positions as the sensors read them and as they are."""

@@ -4,39 +4,45 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import numpy as np
 
-from tactile_cube.drivetrain.effects import Effect, Parameter, find_effect
+from tactile_cube.drivetrain.effects import Effect, Parameter, Stage, find_effect
+from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.errors import InputError
 from tactile_cube.simulation.constants import EpisodeConstants
 
 LEAST_MASS = 0.1
 """Smallest share of the stated mass: a search may try values that would leave less than nothing."""
+COARSE, RATIO = 5, 2.3
+"""Least number of values of a first grid, and the largest ratio of neighbours."""
 _UNEVEN = "a guess: a cube of 8 cm that is filled unevenly"
 
 
-class ContactEffect:
-    """A contact effect; a subclass states data only.
+class ContactEffect(Effect):
+    """A contact effect; a subclass states data only, and its neutral values are the constants of the paper.
 
     Attributes:
-        name: its key in configurations and model files.
-        parameters: its numbers; their neutral values are the constants of the paper, bit for bit.
         constant: the field of EpisodeConstants that it changes.
         added: whether its values are added to the constant; otherwise they replace it.
-        shown_by: kinds of trial that are used to identify it; other kinds where a recording has none of these.
-        shows_in: how it is identified: "slips" (when something slips, each number alone), "load" (how far the fingers
-            give way, all numbers together), "offsets" (joint offsets that a grip would need, the same in all
-            initialisations).
     """
 
-    name: ClassVar[str]
-    parameters: ClassVar[tuple[Parameter, ...]]
+    name, stage = "contact", Stage.CONTACT
+    parameters: ClassVar[tuple[Parameter, ...]] = ()
     constant: ClassVar[str]
     added: ClassVar[bool] = False
-    shown_by: ClassVar[tuple[str, ...]] = ("hold",)
-    shows_in: ClassVar[Literal["slips", "load", "offsets"]] = "slips"
+
+    @classmethod
+    def starts_at(cls, scales: Scales) -> list[dict[str, float]]:
+        """Return a coarse grid over the range of a single number, or the neutral values of several."""
+        (one, *others) = cls.parameters
+        if others:
+            return [{p.name: p.neutral for p in cls.parameters}]
+        factors = np.log(one.high / one.low) if one.low > 0.0 else 0.0
+        count = max(COARSE, int(np.ceil(factors / np.log(RATIO))) + 1)
+        grid = np.geomspace if factors else np.linspace
+        return [{one.name: float(value)} for value in grid(one.low, one.high, count)]
 
     @classmethod
     def apply(cls, constants: EpisodeConstants, values: Mapping[str, float]) -> EpisodeConstants:
@@ -88,7 +94,6 @@ class SpinningFriction(ContactEffect):
 
     name = "spinning_friction"
     constant = "tip_spinning_friction"
-    shown_by = ("twist",)
     parameters = (
         Parameter(
             "radius", "m", neutral=0.003, low=2e-4, high=0.3, typical=0.02, source="website: 0.1, 0.03, 2e-4..2e-2"
@@ -147,7 +152,6 @@ class ObjectCom(ContactEffect):
     name = "object_com"
     constant = "cube_com"
     added = True
-    shows_in = "load"
     parameters = (
         Parameter("x", "m", neutral=0.0, low=-0.03, high=0.03, typical=0.01, source=_UNEVEN),
         Parameter("y", "m", neutral=0.0, low=-0.03, high=0.03, typical=0.01, source=_UNEVEN),
@@ -167,7 +171,6 @@ class ObjectSize(ContactEffect):
     name = "object_size"
     constant = "cube_size"
     added = True
-    shows_in = "offsets"
     parameters = (
         Parameter(
             "excess", "m", neutral=0.0, low=-0.01, high=0.01, typical=0.003, source="website: cubes differ by 5 mm"

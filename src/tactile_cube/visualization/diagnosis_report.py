@@ -4,10 +4,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from tactile_cube.identification.contact.identification import ContactIdentification
-from tactile_cube.identification.in_words import GAIN_OF, answer, joint_rows, proposal, watch_for
+from tactile_cube.identification.in_words import answer, joint_rows, proposal, watch_for
 from tactile_cube.identification.next_experiment import Experiment
 from tactile_cube.identification.search.residual_shape import Shape
 from tactile_cube.measurement.comparing.comparison import Comparison
+from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.units import THOUSANDTHS, TURNS, common_unit, milli, of_joint, short
 from tactile_cube.visualization.charts import PALETTE, SIMULATED, Interval, bar_chart, interval_chart, svg, time_chart
 from tactile_cube.visualization.comparison_report import (
@@ -36,12 +37,6 @@ COLUMNS = {
 INTERVALS = "Values and 95 % intervals, each on a scale of its own; they do not allow for effects that the model lacks."
 REACHED = ("joint", "position in any model", "speed", "torque")
 HELD = "How the error with an object falls"
-EXPLANATION = (
-    "The hand holds a known load and loosens its grip until the load slips. Each trial was simulated in the world that "
-    "training uses, with the joint offsets and the place of the load that suit it. An initialisation's value is the "
-    "one with which its trials are followed best: the simulated load slips when the real one did. The scatter of "
-    "these values makes the interval."
-)
 
 
 def stage_section(
@@ -70,10 +65,9 @@ def stage_section(
     return Section(title, (), blocks)
 
 
-def held_section(contact: Mapping[str, Any]) -> Section:
-    """The error of each stage in the trials with an object, from what diagnosis.json says under `contact`."""
-    # grasps refit no constants
-    return stage_section({k: v for k, v in contact["error"].items() if k != "refitted"}, contact["error_joints"], HELD)
+def held_section(stages: Mapping[str, float], joints: Mapping[str, Mapping[str, float]]) -> Section:
+    """The same of the trials with an object, which refit no constants."""
+    return stage_section({k: v for k, v in stages.items() if k != "refitted"}, joints, HELD)
 
 
 def effect_section(effects: Sequence[Mapping[str, Any]], units: Mapping[str, str] | None = None) -> list[Section]:
@@ -90,8 +84,8 @@ def effect_section(effects: Sequence[Mapping[str, Any]], units: Mapping[str, str
             intervals.append(Interval(label, one["value"], one["low"], one["high"], unit))
         if "heldout_gain" in effect:
             lines.append(
-                f"{effect['name']}@{place} takes {100 * effect['heldout_gain']:.0f} % off "
-                f"{GAIN_OF[effect.get('gain_of', 'error')]} (p {probability(effect['p_value'])})"
+                f"{effect['name']}@{place} takes {100 * effect['heldout_gain']:.0f} % off the held-out squared error "
+                f"(p {probability(effect['p_value'])})"
                 + (f"; cannot be told from {', '.join(effect['rivals'])}" if effect["rivals"] else "")
             )
     blocks: list[Block] = [Listing(lines)] if lines else []
@@ -157,11 +151,11 @@ def train_section(model_path: str) -> Section:
 
 
 def next_section(
-    diagnosis: Mapping[str, Any], model_path: str, before: Comparison, experiment: Experiment | None
+    diagnosis: Mapping[str, Any], model_path: str, recording: Recording, experiment: Experiment | None
 ) -> Section:
     """What to record or to type next."""
     if experiment is not None:
-        return _experiment_section(experiment, before.recording.units)
+        return _experiment_section(experiment, recording.units)
     # Effects of fingertips and object belong to no joint.
     found = [
         one["name"] if joint == "object" else f"{one['name']}@{joint}"
@@ -170,11 +164,19 @@ def next_section(
     ]
     names = [*diagnosis.get("known_effects", []), *found]
     own = f"my_rig.MyEffect@{(diagnosis['unexplained_joints'] or ['JOINT'])[0]}"
-    identify = f"python -m tactile_cube.identify recording={before.recording.folder} effects"
+    identify = f"python -m tactile_cube.identify recording={recording.folder} effects"
     train = f"{TRAIN}{model_path}"
-    own_law = ("Look at the shapes above, write the law as an effect of your own, and fit it:", [f"{identify}=[{own}]"])
+    otherwise: tuple[str, list[str]] = (
+        "Look at the shapes above, write the law as an effect of your own, and fit it:",
+        [f"{identify}=[{own}]"],
+    )
+    if diagnosis.get("noise_floor_source") == "contact":
+        otherwise = (
+            "Record more loads and initialisations, and free motion, which shows the drives; diagnose again.",
+            [],
+        )
     said, lines = {
-        "adequate": ("Train with the refitted constants:", [train]),
+        "adequate": ("Train with this model:", [train]),
         "missing_effect": (
             "Fit exactly these effects, and train with the result:",
             [f"{identify}=[{','.join(names)}]", train],
@@ -183,8 +185,8 @@ def next_section(
             "The model holds what was found: train with it. For the rest, write a law of the shapes and fit both:",
             [train, f"{identify}=[{','.join([*names, own])}]"],
         ),
-    }.get(diagnosis["verdict"], own_law)
-    return Section("What to do next", [said], [Listing(lines, code=True)])
+    }.get(diagnosis["verdict"], otherwise)
+    return Section("What to do next", [said], [Listing(lines, code=True)] if lines else [])
 
 
 def _experiment_section(experiment: Experiment, units: Mapping[str, str]) -> Section:
@@ -234,11 +236,11 @@ def diagnosis_report(
         tone=TONES.get(diagnosis["verdict"], "warn"),
         sections=[
             stage_section(diagnosis["error"], diagnosis.get("error_joints", {}), units=units),
-            *([held_section(diagnosis["contact"])] if "contact" in diagnosis else []),
+            *(held_section(one["error"], one["error_joints"]) for one in [diagnosis.get("contact")] if one),
             *effect_section(diagnosis["effects"], units),
             *shape_section(shapes, units),
             *ranking_section(diagnosis["ranking"]),
-            next_section(diagnosis, model_path, before, experiment),
+            next_section(diagnosis, model_path, before.recording, experiment),
             recording_section(before.recording, before.model),
             where_section(before, "Where the stated model fails"),
             overlay_section(after, "Measured and simulated, before and after what was found", before),
@@ -291,53 +293,17 @@ def identification_report(
     )
 
 
-def contact_sections(found: ContactIdentification, alone: bool = True) -> list[Section]:
-    """What was found of fingertips and object; values only if they stand `alone`, not beside those of the drives."""
-    effects = [{"name": one.effect, "joints": ["object"], "parameters": one.parameters} for one in found.effects()]
-    rows = [
-        (effect, parameter, str(one.initialisation), f"{one.value:.4g}", "" if one.telling else "does not show it")
-        for (effect, parameter), said in found.fit.by_initialisation.items()
-        for one in said
-    ]
-    table = Table(("effect", "parameter", "initialisation", "value", ""), rows)
-    stages = {key: one.overall for key, one in found.stages.items()} | {"noise_floor": found.noise_floor}
-    joints = {key: one.joints for key, one in found.stages.items()}
-    by_initialisation = Section("What each initialisation says", [EXPLANATION], [table])
-    return [stage_section(stages, joints, HELD), *(effect_section(effects) if alone else []), by_initialisation]
-
-
-def contact_diagnosis_report(
-    result: dict[str, Any], name: str, command: str, recording: str, model_path: str
-) -> Report:
+def contact_diagnosis_report(result: dict[str, Any], recording: Recording, command: str, model_path: str) -> Report:
     """The page of a diagnosis of fingertips and object alone, from the content of diagnosis.json."""
-    ranking = [
-        {
-            "effect": row["effects"],
-            "held-out error [mrad]": 1e3 * row["held_out_error"],
-            "share that it takes off": row["gain"],
-            "of": GAIN_OF[row["gain_of"]],
-            "p (no better than without)": row["p_value"],
-        }
-        for row in result["ranking"]
-    ]
-    effects = ",".join(one["name"] for one in result["effects"])
-    train = f"{TRAIN}{model_path}"
-    fit = f"python -m tactile_cube.identify recording={recording} effects=[{effects}]"
-    said, lines = {
-        "adequate": ("Train in the world as it is stated:", [train]),
-        "missing_effect": ("Fit exactly this on all trials, and train with the result:", [fit, train]),
-        "ambiguous": ("Record more loads and initialisations and diagnose again, or see what each would be:", [fit]),
-        "unknown_effect": ("Record free motion too: the drivetrain may lack something that the grasps show.", []),
-    }[result["verdict"]]
     return Report(
-        title=f"What is missing? {name}",
+        title=f"What is missing? {recording.name}",
         answer=answer(result, None),
         tone=TONES.get(result["verdict"], "warn"),
         sections=[
-            held_section(result),
+            held_section(result["error"], result["error_joints"]),
             *effect_section(result["effects"]),
-            *ranking_section(ranking),
-            Section("What to do next", [said], [Listing(lines, code=True)] if lines else []),
+            *ranking_section(result["ranking"]),
+            next_section(result, model_path, recording, None),
         ],
         footer=f"Made by tactile_cube in {result['seconds']:.0f} s: {command}",
     )
@@ -345,11 +311,12 @@ def contact_diagnosis_report(
 
 def contact_report(found: ContactIdentification, name: str, command: str, model_path: str) -> Report:
     """The page of an identification of contact effects alone."""
-    before, after = found.stages["nominal"].overall, found.stages["with_effects"].overall
+    effects = [{"name": one.effect, "joints": ["object"], "parameters": one.parameters} for one in found.effects()]
     return Report(
         title=f"Identified: {name}",
-        answer=f"The error on trials that the fit never saw fell from {milli(before)} to {milli(after)}.",
-        tone="plain" if found.fit.silent() else "good",
-        sections=[*contact_sections(found), train_section(model_path)],
+        answer=f"The error on trials that the fit never saw fell from {milli(found.errors['nominal'])} to "
+        f"{milli(found.errors['with_effects'])}.",
+        tone="plain" if found.silent else "good",
+        sections=[held_section(found.errors, found.joint_errors), *effect_section(effects), train_section(model_path)],
         footer=f"Made by tactile_cube: {command}",
     )

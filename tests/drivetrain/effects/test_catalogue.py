@@ -141,7 +141,7 @@ def test_values_that_make_no_sense_are_refused(values, complaint) -> None:
 @pytest.mark.parametrize(
     ("parts", "complaint"),
     [
-        ({"stage": Stage.FRICTION, "parameters": ()}, "test_effect.Own lacks name$"),
+        ({"stage": Stage.FRICTION, "parameters": ()}, "test_catalogue.Own lacks name$"),
         ({"name": "own", "stage": Stage.FRICTION, "parameters": ()}, r"lacks a static method law\(x, j, p, s, dt\)"),
         (
             {"name": "own", "stage": Stage.MECHANISM, "parameters": ()},

@@ -1,133 +1,122 @@
+"""What a contact lacks is named by the criteria of every other diagnosis."""
+
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tactile_cube.api.diagnosis import DiagnosisResult
+from tactile_cube.api.job import called_job
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile, Provenance
 from tactile_cube.errors import InputError
-from tactile_cube.identification.contact.diagnosis import ContactDiagnosis, ContactSearch, Tried, with_contact
-from tactile_cube.identification.contact.fit import ContactFit
-from tactile_cube.identification.contact.trial import compare_contact
+from tactile_cube.identification.contact.grasps import compare_contact
+from tactile_cube.identification.contact.identification import (
+    ContactDiagnosis,
+    diagnosed,
+    stepped,
+    with_contact,
+)
+from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.measurement.comparing.comparison import comparison_json
-from tactile_cube.measurement.comparing.error import ErrorSummary
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.writing import write_recording
-from tactile_cube.measurement.replay.hand_replay import ContactModel
-from tactile_cube.simulation.contact_effects import ObjectSize
-from tests.identification.easy_contact import EasyTrial, GrippedTrial, friction
+from tactile_cube.simulation.contact_effects import ContactEffect, contact_catalogue
+from tests.identification.easy_grasps import JOINTS, Values, easy_grasps
 from tests.measurement.replay.test_hand_replay import source
+from tests.measurement.small_rig import write
+
+NAMES = [f"j{k}" for k in range(JOINTS)]
+LATERAL: Values = {"lateral_friction": {"coefficient": 0.5}}
+TRUTHS: list[Values] = [
+    LATERAL,
+    {"spinning_friction": {"radius": 0.012}},
+    {"tip_compliance": {"compliance": 1e-3}},
+    {"object_mass": {"excess": 0.06}},
+    {"object_com": {"x": 4e-3, "y": -8e-3, "z": 6e-3}},
+    {"object_size": {"excess": 4e-3}},
+]
 
 
-def search(lateral: float = 0.9, spinning: float = 0.1) -> ContactSearch:
-    trials = [friction(kind, k, lateral, spinning) for k in range(3) for kind in ("hold", "twist")]
-    made = ContactSearch(trials[:4], trials[4:], lambda line: None)  # type: ignore[arg-type]
-    made.run(ContactModel({}))
-    return made
+def diagnosis(truth: Values) -> ContactDiagnosis:
+    return diagnosed(easy_grasps(truth), NAMES, STANDARD, lambda line: None)
 
 
-@pytest.mark.parametrize(
-    ("truth", "names"),
-    [
-        ({}, []),
-        ({"lateral": 0.5}, ["lateral_friction"]),
-        ({"spinning": 0.02}, ["spinning_friction"]),
-        ({"lateral": 0.5, "spinning": 0.02}, ["spinning_friction", "lateral_friction"]),
-    ],
-)
-def test_the_effects_that_are_missing_are_found_and_no_others(truth: dict[str, float], names: list[str]) -> None:
-    found = search(**truth)
-    assert [one.effect.name for one in found.found] == names
-    assert found.verdict(1e-3) == ("missing_effect" if names else "adequate")
+@pytest.mark.parametrize("truth", [{}, *TRUTHS, LATERAL | TRUTHS[1]], ids=lambda truth: "+".join(truth) or "nothing")
+def test_the_effects_that_are_missing_are_found_and_no_others_within_their_intervals(truth: Values) -> None:
+    found = diagnosis(truth)
+    assert {one.effect for one in found.effects()} == truth.keys()
+    assert found.verdict == ("missing_effect" if truth else "adequate")
+    for one in found.effects():
+        for key, estimate in one.parameters.items():
+            assert estimate.low <= truth[one.effect][key] <= estimate.high
+            assert estimate.low < estimate.high
 
 
-@pytest.mark.parametrize(("size", "names"), [(0.0, []), (0.006, ["object_size"])])
-def test_a_size_is_found_by_the_offsets_that_grips_need(size: float, names: list[str]) -> None:
-    trials = [GrippedTrial("hold", k, {("object_size", "excess"): size}, {}) for k in range(4)]
-    found = ContactSearch(trials[:3], trials[3:], lambda line: None)  # type: ignore[arg-type]
-    found.run(ContactModel({}))
-    assert [one.effect.name for one in found.found] == names
-    assert [one.gain_of for one in found.found] == ["offsets"] * len(names)  # and not of the error, which stays
-    assert found.rivals == []
+@pytest.mark.parametrize("strict", [Criteria(least_gain=0.9), Criteria(significant=1e-30)], ids=["price", "chance"])
+def test_the_criteria_reach_contact(strict: Criteria) -> None:
+    assert diagnosed(easy_grasps(LATERAL), NAMES, strict, lambda line: None).verdict == "unknown_effect"
 
 
-@pytest.mark.parametrize(("sizes", "names"), [((0.005, 0.004, 0.006), ["object_size"]), ((0.005, -0.005, 0.003), [])])
-def test_only_what_the_initialisations_agree_on_is_kept(sizes: tuple[float, ...], names: list[str]) -> None:
-    trials = [GrippedTrial("hold", k, {("object_size", "excess"): size}, {}) for k, size in enumerate(sizes)]
-    said: list[str] = []
-    made = ContactSearch(trials, trials, said.append)  # type: ignore[arg-type]
-    made.found = [Tried(ObjectSize, ContactModel({}), 1e-3, 0.4, 1e-9, "offsets")]
-    fit = made.prove(ContactModel({}))
-    assert [one.effect.name for one in made.found] == names
-    assert [effect for effect, _ in fit.estimates] == names
-    assert ("object_size: the initialisations do not agree that there is any" in said) is not bool(names)
-
-
-def test_what_no_effect_explains_is_unknown() -> None:
-    found = search()
-    assert found.verdict(0.0025) == "unknown_effect"
-
-
-def test_an_effect_that_explains_as_much_is_a_rival() -> None:
-    key, other = ("lateral_friction", "coefficient"), ("tip_compliance", "compliance")
-
-    class Confused(EasyTrial):
-        def residual(self, contact: ContactModel) -> np.ndarray:
-            soft = contact.values.get(other[0], {}).get(other[1], 0.0)
-            rough = contact.values.get(key[0], {}).get(key[1], 0.9)
-            off = min(abs(np.log(rough / 0.5)), abs(soft / 1e-3 - 1))
-            return 1e-3 * self.noise + 1e-2 * off
-
-    trials = [Confused("hold", k, {}, {}) for k in range(4)]
-    found = ContactSearch(trials[:3], trials[3:], lambda line: None)  # type: ignore[arg-type]
-    found.run(ContactModel({}))
-    assert found.verdict(1e-3) == "ambiguous"
-    named = {found.found[-1].effect.name, *(one.effect.name for one in found.rivals)}
-    assert named == {"lateral_friction", "tip_compliance"}
-
-
-def diagnosis(lateral: float) -> ContactDiagnosis:
-    made = search(lateral)
-    stages = {key: ErrorSummary(1e-3, {"a": 1e-3}) for key in ("nominal", "with_effects")}
-    return ContactDiagnosis(ContactFit(ContactModel({}), {}, {}), stages, 2e-4, ["hold_3"], made)
+@pytest.mark.parametrize("effect", [*contact_catalogue().values()])
+def test_a_step_from_the_best_start_comes_near_the_truth(effect: type[ContactEffect]) -> None:
+    truth = next(one for one in TRUTHS if effect.name in one)
+    grasps = easy_grasps(truth)
+    _, fitted = stepped(grasps.fitted, grasps.start, effect)
+    before = grasps.fitted.judged(grasps.start).costs.sum() - grasps.fitted.judged(grasps.start).samples.sum()
+    after = grasps.fitted.judged(fitted.model).costs.sum() - grasps.fitted.judged(fitted.model).samples.sum()
+    assert after < 0.5 * before
 
 
 def test_the_answer_has_the_keys_of_diagnosis_json() -> None:
-    result = diagnosis(0.5).as_json()
+    result = diagnosis(LATERAL).as_json()
     assert result["verdict"] == "missing_effect"
     (entry,) = result["effects"]
-    assert (entry["name"], entry["rivals"]) == ("lateral_friction", [])
-    assert entry["heldout_gain"] > 0.5
-    assert entry["p_value"] < 0.05
+    assert (entry["name"], entry["joints"], entry["rivals"]) == ("lateral_friction", ["object"], [])
+    assert entry["heldout_gain"] > 0.1
+    assert entry["p_value"] < STANDARD.significant
     assert set(entry["parameters"]["coefficient"]) == {"value", "low", "high", "unit"}
     assert set(result["error"]) == {"nominal", "refitted", "with_effects", "noise_floor"}
+    assert result["ranking"][0]["effects"] == "lateral_friction"
 
 
 @pytest.mark.parametrize(
-    ("drive", "lateral", "verdict"),
+    ("drive", "truth", "verdict"),
     [
-        ("adequate", 0.9, "adequate"),
-        ("adequate", 0.5, "missing_effect"),
-        ("missing_effect", 0.9, "missing_effect"),
-        ("unknown_effect", 0.5, "unknown_effect"),
-        ("partly_explained", 0.9, "partly_explained"),
-        ("partly_explained", 0.5, "partly_explained"),
+        ("adequate", {}, "adequate"),
+        ("adequate", LATERAL, "missing_effect"),
+        ("missing_effect", {}, "missing_effect"),
+        ("unknown_effect", LATERAL, "unknown_effect"),
+        ("partly_explained", LATERAL, "partly_explained"),
     ],
 )
-def test_the_verdicts_on_drivetrain_and_contact_become_one(drive: str, lateral: float, verdict: str) -> None:
+def test_the_verdicts_on_drivetrain_and_contact_become_one(drive: str, truth: Values, verdict: str) -> None:
     result = {"verdict": drive, "effects": [], "partial_effects": []}
-    assert with_contact(result, diagnosis(lateral))["verdict"] == verdict
+    assert with_contact(result, diagnosis(truth))["verdict"] == verdict
 
 
 def test_the_model_file_tells_which_trials_judged() -> None:
     model = ModelFile(joints=["a"], provenance=Provenance(trials=["hold_0", "hold_3"]))
-    made = diagnosis(0.5).into(model, alone=True)
-    assert (made.provenance.trials, made.provenance.held_out) == (["hold_0"], ["hold_3"])
+    made = diagnosis(LATERAL).into(model, alone=True)
+    assert (made.provenance.trials, made.provenance.held_out) == (["hold_0"], ["hold_3", "twist_3"])
 
 
 def test_an_adequate_contact_adds_nothing_to_the_model() -> None:
-    model = ModelFile(joints=["a"])
-    assert diagnosis(0.9).into(model, alone=False).effects == []
+    assert diagnosis({}).into(ModelFile(joints=["a"]), alone=False).effects == []
+
+
+@pytest.mark.parametrize(("report", "files"), [(True, {"report.html"}), (False, set())])
+def test_a_report_is_written_where_it_is_asked_for(report: bool, files: set[str], tmp_path: Path) -> None:
+    recording, found = read_recording(write(tmp_path / "r")), diagnosis(LATERAL)
+    model = found.into(ModelFile(joints=list(recording.joints)), alone=True)
+    data = found.as_json() | {"known_effects": [], "seconds": 1.0}
+    job = called_job("diagnose", {"recording": tmp_path / "r"})
+    DiagnosisResult(recording, None, None, found, model, data, job).write(tmp_path / "out", report)
+    assert {one.name for one in (tmp_path / "out").iterdir()} == {"model.yaml", "diagnosis.json"} | files
+    if report:
+        page = (tmp_path / "out" / "report.html").read_text()
+        assert "effects=[lateral_friction]" in page
+        assert "takes" in page
 
 
 @pytest.fixture(scope="module")

@@ -21,7 +21,9 @@ Simpler = Mapping[str, Mapping[str, float]]
 
 
 class Stage(Enum):
-    """Where an effect acts; the value is the row of `x` whose new value the law returns (MECHANISM: no law).
+    """Where an effect acts; the value is the row of `x` whose new value the law returns.
+
+    MECHANISM changes constants of a rig and CONTACT those of fingertips and object: no law.
 
     What a CONTROLLER adds counts for its torque limit, what MOTOR_TORQUE adds comes after it.
     """
@@ -35,6 +37,7 @@ class Stage(Enum):
     JOINT_TORQUE = signals.JOINT_TORQUE
     FRICTION = signals.FRICTION
     MECHANISM = -1
+    CONTACT = -2
 
 
 @dataclass(frozen=True)
@@ -151,8 +154,13 @@ class Effect:
         lacks = [key for key in ("name", "stage", "parameters") if not hasattr(cls, key)]
         if not lacks and cls.stage is Stage.MECHANISM and not cls.defines("configure"):
             lacks = ["a static method configure(view, place, p)"]
-        if not lacks and cls.stage is not Stage.MECHANISM and not cls.defines("law"):
+        if not lacks and cls.stage.value >= 0 and not cls.defines("law"):
             lacks = ["a static method law(x, j, p, s, dt)"]
+        if not isinstance(cls.contains, Mapping):
+            given = f"effect class {cls.__module__}.{cls.__qualname__}: contains is {cls.contains!r}"
+            raise InputError(
+                f"{given}; give the values where it becomes each simpler effect, {{'NAME': {{'KEY': 0.0}}}}"
+            )
         if lacks:
             raise InputError(f"effect class {cls.__module__}.{cls.__qualname__} lacks {', '.join(lacks)}")
 

@@ -1,23 +1,81 @@
-"""Identify effects of fingertips and object from the trials in which the hand holds one."""
+"""Effects of fingertips and object: those that a user names fitted, and those that a model lacks searched for."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelErrors, ModelFile
+from tactile_cube.drivetrain.effects.scales import FINGER
+from tactile_cube.drivetrain.model_file import EffectEstimate, ModelErrors, ModelFile
 from tactile_cube.errors import InputError
-from tactile_cube.identification.contact.fit import ContactFit, fit_contact, shown_by
-from tactile_cube.identification.contact.trial import ContactTrial, open_grasps
+from tactile_cube.identification.contact.grasps import (
+    FITTED,
+    JUDGED,
+    OBJECT,
+    Grasps,
+    OpenGrasps,
+    open_grasps,
+    some_of_each_kind,
+)
+from tactile_cube.identification.criteria import STANDARD, Criteria
+from tactile_cube.identification.diagnosis_json import effect_entries, names_of, ranking
+from tactile_cube.identification.fitting.gauss_newton import Fit, fit, precision
+from tactile_cube.identification.fitting.intervals import NORMAL_95, Fitted, bounds, standard_errors
+from tactile_cube.identification.model_files import effect_estimate
+from tactile_cube.identification.search.candidates import Candidate, model_unknowns, without_effect
+from tactile_cube.identification.search.evidence import gain, p_value, worse
+from tactile_cube.identification.search.explanation import Explanation, Proposal, named_by
+from tactile_cube.identification.search.findings import Findings
+from tactile_cube.identification.search.proposals import CLOSE
+from tactile_cube.identification.verdict import Kind, Verdict, decide, unexplained_joints
 from tactile_cube.measurement.bench import with_object
-from tactile_cube.measurement.comparing.error import ErrorSummary, summarise_errors
+from tactile_cube.measurement.comparing.error import ErrorSummary
 from tactile_cube.measurement.recordings.reading import DESCRIPTION
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.hand_replay import ContactModel
+from tactile_cube.measurement.replay.model import Model
 from tactile_cube.simulation.contact_effects import ContactEffect, contact_catalogue, is_contact_effect
+
+Array = NDArray[np.float64]
+Say = Callable[[str], None]
+LOOKED = 1  # trials of each kind on which every law gets its first step
+STEPS, LAST_STEPS = 3, 2  # of Gauss-Newton, of a set in a search and of the last fit
+FINER = 2  # trials of each kind that tell what shorter steps of the world change
+SINGLES, MOST = 3, 3  # laws of each round that are refitted on more trials; effects of a set
+SURER: tuple[Kind, ...] = ("unknown_effect", "partly_explained", "ambiguous", "missing_effect", "adequate")
+"""Verdicts, the one that leaves most open first."""
+
+
+def stepped(problem: Grasps, parent: Model, effect: type[ContactEffect]) -> tuple[Candidate, Fit]:
+    """An effect beside a contact, from the start that suits best, after a step of its own."""
+    found = []
+    for form in effect.starts_at(FINGER):
+        candidate = Candidate(effect, (OBJECT,), form)
+        model, unknowns = candidate.added_to(parent)
+        found.append((problem.squares(model), candidate, model, unknowns))
+    _, candidate, model, unknowns = min(found, key=lambda one: one[0])
+    return candidate, fit(problem, model, unknowns, iterations=1)
+
+
+def final(grasps: OpenGrasps, model: Model) -> Fitted:
+    """A contact refitted on all fitted trials, with intervals, unless held-out ones are followed worse then."""
+    problem = grasps.fitted
+    problem.linearise_starts(model)
+    fitted = fit(problem, model, model_unknowns(model), LAST_STEPS)
+    if worse(grasps.held_out.judged(fitted.model), grasps.held_out.judged(model)):
+        fitted = fit(problem, model, model_unknowns(model), iterations=0)
+    if not fitted.unknowns:
+        return Fitted(fitted.model, fitted, np.zeros(0), np.zeros(0))
+    scales = np.array([u.scale for u in fitted.unknowns])
+    few = some_of_each_kind(problem, FINER)
+    base, columns = few.columns(fitted.model, fitted.unknowns)
+    moved = few.limited(grasps.finer(few).prediction(fitted.model) - base) * few.weight
+    pull, information = columns.reshape(-1, len(scales)).T @ moved.ravel(), np.einsum("grp,grq->pq", columns, columns)
+    shift = -scales * np.linalg.solve(information + np.diag(precision(fitted.unknowns)), pull)
+    return Fitted(fitted.model, fitted, NORMAL_95 * scales * standard_errors(problem, fitted), shift)
 
 
 @dataclass(frozen=True)
@@ -25,13 +83,13 @@ class ContactIdentification:
     """Contact effects with intervals, and what they gain.
 
     Attributes:
-        fit: values, intervals and what each initialisation said.
+        fitted: values and intervals.
         stages: nominal and with_effects: errors on held-out trials, offsets and the box's place fitted to each [rad].
         noise_floor: noise of the position sensors, and what a world with the true effects leaves [rad].
         held_out: names of the held-out trials.
     """
 
-    fit: ContactFit
+    fitted: Fitted
     stages: dict[str, ErrorSummary]
     noise_floor: float
     held_out: list[str]
@@ -41,8 +99,7 @@ class ContactIdentification:
         effects = model.with_effects(self.effects())
         if not alone:
             return model.model_copy(update={"effects": effects})
-        joints = {key: summary.joints for key, summary in self.stages.items()}
-        errors = ModelErrors(**self.errors, joints=joints)
+        errors = ModelErrors(**self.errors, joints=self.joint_errors)
         fitted = [name for name in model.provenance.trials if name not in self.held_out]
         provenance = model.provenance.model_copy(update={"trials": fitted, "held_out": self.held_out})
         return model.model_copy(update={"effects": effects, "errors": errors, "provenance": provenance})
@@ -52,24 +109,36 @@ class ContactIdentification:
         """The error of each stage, and the noise floor [rad]."""
         return {key: one.overall for key, one in self.stages.items()} | {"noise_floor": self.noise_floor}
 
+    @property
+    def joint_errors(self) -> dict[str, dict[str, float]]:
+        """Stage -> joint -> error [rad]."""
+        return {key: one.joints for key, one in self.stages.items()}
+
     def effects(self) -> list[EffectEstimate]:
         """As the model file states them."""
-        parameters: dict[str, dict[str, Estimate]] = {}
-        for (effect, parameter), estimate in self.fit.estimates.items():
-            parameters.setdefault(effect, {})[parameter] = estimate
-        return [EffectEstimate(effect=name, parameters=values) for name, values in parameters.items()]
+        known = bounds(self.fitted)
+        return [
+            effect_estimate(term, place, known) for place, term in enumerate(self.fitted.model.terms) if term.fitted
+        ]
+
+    @property
+    def silent(self) -> list[str]:
+        """Parameters of which the trials say nothing: any value that is allowed suits them."""
+        terms, known = self.fitted.model.terms, bounds(self.fitted)
+        return [
+            f"{terms[u.place].effect.name} {u.key}"
+            for u in self.fitted.fit.unknowns
+            if known[u.kind, u.key, u.place, u.initialisation][1:] == (u.low, u.high)
+        ]
 
     def as_json(self) -> dict[str, Any]:
         """Plain numbers, errors in rad."""
         return {
             "effects": [one.model_dump() for one in self.effects()],
             "error": self.errors,
-            "joints": {key: one.joints for key, one in self.stages.items()},
+            "joints": self.joint_errors,
             "held_out": self.held_out,
-            "initialisations": {
-                " ".join(key): [vars(one) for one in said] for key, said in self.fit.by_initialisation.items()
-            },
-            "silent": self.fit.silent(),
+            "silent": self.silent,
         }
 
 
@@ -101,7 +170,7 @@ def identify_contact(
     model: ModelFile | None = None,
     step: float = 0.002,
     seed: int = 0,
-    say: Callable[[str], None] = print,
+    say: Say = print,
 ) -> ContactIdentification:
     """Fit contact effects by simulation in the world that training uses, the drivetrain taken as known.
 
@@ -114,15 +183,167 @@ def identify_contact(
         say: takes progress lines.
     """
     with open_grasps(recording, model, step, seed) as grasps:
-        fit = fit_contact(grasps.fitted, effects, grasps.start, say)
+        few, found = some_of_each_kind(grasps.fitted, LOOKED), grasps.without(effects)
+        few.linearise_starts(found)
+        for effect in effects:
+            found = stepped(few, found, effect)[1].model
+            say(f"{effect.name}: {_values(found.terms[-1].values)}")
+        fitted = final(grasps, found)
         say("simulating the held-out trials")
-        validation = list(dict.fromkeys(one for effect in effects for one in shown_by(grasps.held_out, effect)))
-        stages = {"nominal": grasps.start, "with_effects": fit.contact}
-        errors = {key: _error(validation, contact, grasps.joints) for key, contact in stages.items()}
-    return ContactIdentification(fit, errors, grasps.noise_floor, [one.trial.name for one in validation])
+        stages = {"nominal": grasps.start, "with_effects": fitted.model}
+        errors = {key: grasps.held_out.errors(one, recording.joints) for key, one in stages.items()}
+        held_out = [one.trial.name for one in grasps.held_out.grasps]
+    return ContactIdentification(fitted, errors, grasps.noise_floor, held_out)
 
 
-def _error(trials: Sequence[ContactTrial], contact: ContactModel, joints: Sequence[str]) -> ErrorSummary:
-    """RMS error [rad], offsets and the box's place fitted in each trial."""
-    residuals = [np.where(one.trial.valid[:, None], one.residual(contact), np.nan) for one in trials]
-    return summarise_errors(residuals, tuple(joints))
+def _values(values: Mapping[str, float]) -> str:
+    return ", ".join(f"{key} {value:.3g}" for key, value in values.items())
+
+
+class ContactSearch:
+    """The search for what a contact lacks: laws by themselves, sets that grow, the best judged on held-out trials."""
+
+    def __init__(self, grasps: OpenGrasps, criteria: Criteria, say: Say) -> None:
+        """Simulates the contact as it is stated."""
+        self.criteria, self.say = criteria, say
+        self.few, self.problem = (some_of_each_kind(grasps.fitted, count) for count in (LOOKED, FITTED))
+        self.validation = some_of_each_kind(grasps.held_out, JUDGED)
+        say(f"simulating {len(self.problem.grasps)} trials as stated, and {len(self.validation.grasps)} that validate")
+        for problem in (self.few, self.problem):
+            problem.linearise_starts(grasps.start)
+        start = fit(self.problem, grasps.start, (), iterations=0)
+        self.base = Explanation((), start, self.validation.judged(grasps.start), 1.0, 0.0)
+
+    def find(self) -> Findings:
+        """Everything that was tried, all laws of the catalogue counted."""
+        judged = tuple(self.explained(one) for one in self.proposed())
+        return Findings(self.base, self.base.judgement, judged, looked=len(contact_catalogue()))
+
+    def proposed(self) -> list[Proposal]:
+        """Sets by their fit alone."""
+        parent, found = Proposal((), self.base.fit), dict[frozenset[tuple[str, str]], Proposal]()
+        most = self.criteria.floor
+        while len(parent.effects) < MOST and self.problem.judged(parent.fit.model).joint_errors.max() > most:
+            most = self.criteria.adequate  # what a world with the true effects leaves is no reason for one more
+            grown = sorted(self.grown(parent), key=lambda one: one.price(self.criteria))
+            found |= {named_by(one.effects): one for one in grown}
+            if not grown or grown[0].price(self.criteria) >= parent.price(self.criteria):
+                break
+            parent = grown[0]
+        for place in range(len(parent.effects)) if len(parent.effects) > 1 else ():
+            effects = (*parent.effects[:place], *parent.effects[place + 1 :])
+            if named_by(effects) not in found:
+                model = without_effect(parent.fit.model, parent.effects, place)
+                found[named_by(effects)] = self.refitted(effects, model)
+        return list(found.values())
+
+    def grown(self, parent: Proposal) -> list[Proposal]:
+        """The parent with one law more: those that promise most by their own step, everything refitted."""
+        known = {term.effect for term in parent.fit.model.terms}
+        left = [effect for effect in contact_catalogue().values() if effect not in known]
+        laws = sorted((stepped(self.few, parent.fit.model, effect) for effect in left), key=lambda one: one[1].cost)
+        worth = (1.0 - self.criteria.least_gain) * self.few.squares(parent.fit.model)
+        worth = min(worth, CLOSE * laws[0][1].cost)
+        laws = [one for one in laws if one[1].cost < worth][:SINGLES]
+        return [self.refitted((*parent.effects, law), fitted.model) for law, fitted in laws]
+
+    def refitted(self, effects: tuple[Candidate, ...], model: Model) -> Proposal:
+        """A set with everything free."""
+        one = Proposal(effects, fit(self.problem, model, model_unknowns(model), STEPS))
+        left = np.sqrt(one.fit.cost / self.base.fit.cost)
+        said = (f"{term.effect.name} {_values(term.values)}" for term in one.fit.model.terms if term.fitted)
+        self.say(f"  leaves {100 * left:.0f} % of the error: {' & '.join(said)}")
+        return one
+
+    def explained(self, one: Proposal) -> Explanation:
+        """A fitted set on the held-out trials."""
+        judged = self.validation.judged(one.fit.model)
+        chance = min(1.0, p_value(self.base.judgement, judged) * len(contact_catalogue()))
+        return Explanation(one.effects, one.fit, judged, chance, gain(self.base.judgement, judged))
+
+
+@dataclass(frozen=True)
+class ContactDiagnosis(ContactIdentification):
+    """The answer, and the effects that were found with their intervals.
+
+    Attributes:
+        answer: the answer.
+        findings: what was tried.
+        rivals: what explains the grasps as well, with intervals.
+        unexplained: joints of which more is left than is tolerated.
+        criteria: what decided.
+    """
+
+    answer: Verdict
+    findings: Findings
+    rivals: tuple[tuple[Explanation, Fitted], ...]
+    unexplained: list[str]
+    criteria: Criteria
+
+    @property
+    def verdict(self) -> Kind:
+        """The answer in a word."""
+        return self.answer.kind
+
+    def as_json(self) -> dict[str, Any]:
+        """In the terms of diagnosis.json; errors in rad."""
+        explanations = [(self.answer.chosen, self.fitted), *self.rivals]
+        entries, unknown = effect_entries(explanations), self.verdict == "unknown_effect"
+        return {
+            "verdict": self.verdict,
+            "effects": [] if unknown else entries,
+            "sets": [names_of(one) for one, _ in explanations] if self.rivals else [],
+            "unexplained_joints": self.unexplained,
+            "ranking": ranking(self.findings, self.criteria),
+            # grasps refit no constants of the drives: the stated error stands for the refitted one
+            "error": self.errors | {"refitted": self.errors["nominal"]},
+            "error_joints": self.joint_errors,
+            "noise_floor_source": "contact",
+            "unexplained": [],
+            "partial_effects": entries if unknown else [],
+            "next_experiment": None,
+            "held_out": self.held_out,
+        }
+
+
+def diagnose_contact(
+    recording: Recording,
+    model: ModelFile | None = None,
+    step: float = 0.002,
+    seed: int = 0,
+    say: Say = print,
+    criteria: Criteria = STANDARD,
+) -> ContactDiagnosis:
+    """Find out by some criteria which contact effect a model lacks; arguments as in `identify_contact`."""
+    with open_grasps(recording, model, step, seed) as grasps:
+        return diagnosed(grasps, recording.joints, criteria, say)
+
+
+def diagnosed(grasps: OpenGrasps, joints: Sequence[str], criteria: Criteria, say: Say) -> ContactDiagnosis:
+    """The same of grasps that are simulated by anything."""
+    search = ContactSearch(grasps, criteria, say)
+    findings = search.find()
+    answer = decide(findings, criteria)
+    say(f"verdict {answer.kind}: {answer.chosen.label}")
+    fitted = final(grasps, answer.chosen.fit.model)
+    rivals = tuple((one, final(grasps, one.fit.model)) for one in answer.rivals)
+    stages = {"nominal": grasps.start, "with_effects": fitted.model}
+    errors = {key: search.validation.errors(one, joints) for key, one in stages.items()}
+    held_out = [one.trial.name for one in search.validation.grasps]
+    left = unexplained_joints(answer.chosen, (*joints, "joint offsets"), criteria)
+    return ContactDiagnosis(fitted, errors, grasps.noise_floor, held_out, answer, findings, rivals, left, criteria)
+
+
+def with_contact(result: Mapping[str, Any], found: ContactDiagnosis) -> dict[str, Any]:
+    """The content of diagnosis.json of a drivetrain, with what was found of fingertips and object.
+
+    The errors stay those of free motion; those of the grasps stand under `contact`.
+    """
+    contact = found.as_json()
+    return {
+        **result,
+        "verdict": min(result["verdict"], contact["verdict"], key=SURER.index),
+        "effects": [*result["effects"], *contact["effects"]],
+        "partial_effects": [*result["partial_effects"], *contact["partial_effects"]],
+        "contact": contact,
+    }

@@ -104,7 +104,7 @@ def _linearised(
 
 def _evaluated(problem: Problem, near: Fit, model: Model) -> Fit:
     """A model with the derivatives of one close to it: one simulation, exact."""
-    residual = problem.residual(problem.windows.by_segment(problem.path(model).position))
+    residual = problem.residual(problem.prediction(model))
     cost, penalty = float(problem.cost(residual).sum()), prior_penalty(model, near.unknowns)
     return replace(near, model=model, cost=cost, prior_penalty=penalty, residual=residual)
 

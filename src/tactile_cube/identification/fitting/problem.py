@@ -47,6 +47,10 @@ class Problem:
             self._path = model, self.windows, self.shooting.path(model, self.windows)
         return self._path[2]
 
+    def prediction(self, model: Model) -> Array:
+        """What a model predicts, (G, R) [rad]."""
+        return self.windows.by_segment(self.path(model).position)
+
     def linearise_starts(self, model: Model) -> None:
         """Take the initial states of trials and the sensitivity to segment starts from this model from now on."""
         self.windows = with_initial_states(self.shooting, model, self.windows)
@@ -122,7 +126,7 @@ class Problem:
     def columns(self, model: Model, unknowns: Sequence[Unknown]) -> tuple[Array, Array]:
         """Prediction (G, R) of a model and its derivatives (G, R, P), weighted, per unit of each unknown's scale."""
         moved = [moved_model(model, unknown) for unknown in _simulated(unknowns)]
-        base = self.windows.by_segment(self.path(model).position)
+        base = self.prediction(model)
         predictions = self.predictions([one for one, _ in moved], model)
         found = {
             _key(unknown): (np.clip(p - base, -self.run_away, self.run_away) / step * self.weight)

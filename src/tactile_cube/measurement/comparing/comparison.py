@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -83,10 +84,14 @@ class Comparison:
     regimes: list[Regime]
     sentences: list[str]  # the regimes in words
     whiteness: list[Whiteness]
-    cross_correlations: list[CrossCorrelation]  # the strongest first
     failing_intervals: list[FailingInterval]
     band: Band | None
     step: float  # of the simulation, at most [s]
+
+    @cached_property
+    def cross_correlations(self) -> list[CrossCorrelation]:
+        """What the residuals go with, the strongest first."""
+        return cross_correlations(self.recording.trials, self.residuals, self.recording.joints)
 
     @property
     def ratio(self) -> float:
@@ -185,7 +190,6 @@ def describe_comparison(
             *(one.sentence(recording.units[one.joint]) for one in floor.drift),
         ],
         whiteness=whiteness(trials, errors, joints),
-        cross_correlations=cross_correlations(trials, errors, joints),
         failing_intervals=[
             interval
             for trial, one in zip(trials, errors, strict=True)

@@ -198,7 +198,7 @@ def whiteness(trials: Sequence[Trial], errors: Sequence[Array], joints: Sequence
     for index, joint in enumerate(joints):
         columns = [_filled(error[:, index]) for error in errors]
         p = min(1.0, len(columns) * min(ljung_box(column) for column in columns))
-        memory = [_memory(column) * trial.step for column, trial in zip(columns, trials, strict=True)]
+        memory = [_memory(_autocorrelation(column)) * trial.step for column, trial in zip(columns, trials, strict=True)]
         results.append(Whiteness(joint, p, float(np.mean(memory))))
     return results
 
@@ -215,16 +215,20 @@ def cross_correlations(
     trials: Sequence[Trial], errors: Sequence[Array], joints: Sequence[str]
 ) -> list[CrossCorrelation]:
     """Every joint's residual against velocity, acceleration, torque, ... of all joints, the strongest first."""
+    found: dict[tuple[str, str], list[tuple[float, float, float]]] = {}
+    for trial, error in zip(trials, errors, strict=True):
+        causes = {name: (cause, _autocorrelation(cause)) for name, cause in _causes(trial, joints).items()}
+        for index, joint in enumerate(joints):
+            own = _filled(error[:, index])
+            remembered = _autocorrelation(own)
+            for name, cause in causes.items():
+                strongest = _strongest((own, remembered), cause, trial.step)
+                found.setdefault((joint, name), []).append(strongest)
     results = []
-    for index, joint in enumerate(joints):
-        causes: dict[str, list[tuple[float, float, float]]] = {}
-        for trial, error in zip(trials, errors, strict=True):
-            for name, cause in _causes(trial, joints).items():
-                causes.setdefault(name, []).append(_strongest(_filled(error[:, index]), cause, trial.step))
-        for name, values in causes.items():
-            correlation, delay, p = np.array(values).T
-            combined = float(stats.combine_pvalues(np.clip(p, 1e-300, 1), method="fisher").pvalue)
-            results.append(CrossCorrelation(joint, name, float(correlation.mean()), float(np.median(delay)), combined))
+    for (joint, name), values in found.items():
+        correlation, delay, p = np.array(values).T
+        combined = float(stats.combine_pvalues(np.clip(p, 1e-300, 1), method="fisher").pvalue)
+        results.append(CrossCorrelation(joint, name, float(correlation.mean()), float(np.median(delay)), combined))
     return sorted(results, key=lambda one: -abs(one.correlation))
 
 
@@ -239,9 +243,12 @@ def _causes(trial: Trial, joints: Sequence[str]) -> dict[str, Array]:
     return {f"{name} of {joint}": values[:, j] for name, values in signals.items() for j, joint in enumerate(joints)}
 
 
-def _strongest(error: Array, cause: Array, step: float) -> tuple[float, float, float]:
-    """Correlation, delay [s] and p-value at the lag where the residual follows the cause best."""
-    a, b = error - error.mean(), cause - cause.mean()
+def _strongest(error: tuple[Array, Array], cause: tuple[Array, Array], step: float) -> tuple[float, float, float]:
+    """Correlation, delay [s] and p-value at the lag where the residual follows the cause best.
+
+    Either signal comes with its autocorrelation.
+    """
+    a, b = (values - values.mean() for values, _ in (error, cause))
     scale = float(np.sqrt(np.sum(a * a) * np.sum(b * b)))
     if scale == 0:
         return 0.0, 0.0, 1.0
@@ -250,16 +257,16 @@ def _strongest(error: Array, cause: Array, step: float) -> tuple[float, float, f
     window = full[len(b) - 1 : len(b) + longest]
     lag = int(np.argmax(np.abs(window)))
     lags = slice(1, len(a) // 4)
-    shared = float(1 + 2 * np.sum(_autocorrelation(a)[lags] * _autocorrelation(b)[lags]))
+    shared = float(1 + 2 * np.sum(error[1][lags] * cause[1][lags]))
     effective = max(4.0, len(a) / max(1.0, shared))  # fewer independent samples, by Bartlett's factor
-    p = 2 * stats.norm.sf(abs(window[lag]) * np.sqrt(effective)) * max(1.0, longest / _memory(error))
+    p = 2 * stats.norm.sf(abs(window[lag]) * np.sqrt(effective)) * max(1.0, longest / _memory(error[1]))
     return float(window[lag]), lag * step, float(min(1.0, p))
 
 
-def _memory(values: Array) -> float:
-    """Samples until the autocorrelation has fallen below 1/e."""
-    below = np.flatnonzero(_autocorrelation(values) < np.exp(-1))
-    return float(below[0]) if len(below) else float(len(values))
+def _memory(autocorrelation: Array) -> float:
+    """Samples until an autocorrelation has fallen below 1/e."""
+    below = np.flatnonzero(autocorrelation < np.exp(-1))
+    return float(below[0]) if len(below) else float(len(autocorrelation))
 
 
 def _autocorrelation(values: Array) -> Array:

@@ -45,10 +45,6 @@ class ContactModel:
         every = [(name, key, value) for name, values in self.values.items() for key, value in values.items()]
         return frozenset(one for one in every if one[2] != neutral[one[:2]])
 
-    def changed(self, effect: str, **values: float) -> ContactModel:
-        """The same with other values of one effect."""
-        return ContactModel({**self.values, effect: {**self.values.get(effect, {}), **values}})
-
 
 def contact_of(model: ModelFile | None) -> ContactModel:
     """What a model file says about fingertips and object."""
@@ -68,13 +64,12 @@ class HandReplay:
         recording: Recording,
         model: Model,
         step: float = 0.002,
-        iterations: int = 30,
         hand: Hand = DLR_HAND2,
         engine: EngineName = "bullet",
     ) -> None:
         """Builds the world of a recording of the whole hand; the model's joint offsets are not used.
 
-        Physics steps last `step` [s] at most, with so many iterations of the contact solver.
+        Physics steps last `step` [s] at most.
 
         Raises:
             InputError: the recording is of another mechanism, or its commands are torques.
@@ -86,7 +81,7 @@ class HandReplay:
         self.finger_of = self._back // hand.joints_per_finger
         self._model = model
         substeps = max(1, int(np.ceil(recording.step / step - 1e-6)))
-        options = SimulationOptions(engine, recording.step / substeps, substeps, iterations)
+        options = SimulationOptions(engine, recording.step / substeps, substeps)
         self._world = World(hand, options, [term.effect(term.joint, **term.values) for term in model.terms])
         self._nominal = self._constants()
 

@@ -7,15 +7,20 @@ from dataclasses import dataclass, field, replace
 
 from tactile_cube.drivetrain.effects import resolve
 from tactile_cube.drivetrain.effects.catalogue import catalogue
-from tactile_cube.drivetrain.effects.effect import Array, Effect
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Stage
 
 EffectClass = type[Effect]
 
 
 def effect_path(effect: EffectClass) -> str:
     """The name by which `find_effect` finds an effect: that of the catalogue, or the dotted path of a user's class."""
-    known = catalogue().get(effect.name) is effect
+    known = effect.stage is Stage.CONTACT or catalogue().get(effect.name) is effect
     return effect.name if known else f"{effect.__module__}.{effect.__qualname__}"
+
+
+def effect_label(effect: EffectClass, joint: str) -> str:
+    """As a user writes it: `backlash@q2`, `my_rig.CableDrag@q2`, `lateral_friction`."""
+    return effect_path(effect) if effect.stage is Stage.CONTACT else f"{effect_path(effect)}@{joint}"
 
 
 @dataclass(frozen=True)
@@ -38,8 +43,8 @@ class Term:
 
     @property
     def label(self) -> str:
-        """As a user writes it: `backlash@q2`, `my_rig.CableDrag@q2`."""
-        return f"{effect_path(self.effect)}@{self.joint}"
+        """As a user writes it."""
+        return effect_label(self.effect, self.joint)
 
 
 def terms_of(effects: Iterable[tuple[str, Mapping[str, float]]], joints: tuple[str, ...]) -> tuple[Term, ...]:

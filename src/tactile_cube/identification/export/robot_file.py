@@ -1,4 +1,4 @@
-"""A rig and its model as MJCF, with position or motor actuators."""
+"""A rig and its model as MJCF, with position or motor actuators, or as URDF: limits, friction and damping of joints."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from html import escape
 from math import ceil, isfinite
 from typing import Literal
+from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from tactile_cube.drivetrain.effects.effect import Stage
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.hand.rigid_body import RigidBodyTree
+from tactile_cube.hand.urdf_tree import robot_of
 from tactile_cube.identification.export.joint_drive import JointDrive, drives_of
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.nominal import nominal_model
@@ -22,6 +24,8 @@ from tactile_cube.measurement.replay.simulator import Simulator
 Array = NDArray[np.float64]
 OF_MECHANISM = ("mass", "com", "inertia", "gravity", "ratio", "offset")
 OF_JOINT = ("kp", "kd", "torque_limit", "armature", "friction", "damping", "delay")
+OF_LOOP = {True: ("stall", "no_load", "rate"), False: ("bias",)}
+"""What the actuator of a position controller holds beside, as a servo or not."""
 STEP = 1e-4
 """Longest time step [s]: MuJoCo's Euler acts half a step early, 0.15 mrad at 3 rad/s."""
 DRY = 'solreffriction="0.002 1" solimpfriction="0.999 0.9999 0.001 0.5 2"'
@@ -43,8 +47,18 @@ def as_mjcf(model: ModelFile, recording: Recording) -> tuple[str, list[str]]:
     numbers = {key: simulator.plant.view(memory, key)[0] for key in OF_MECHANISM}
     mechanical = [term.effect.name for term in known.terms if term.effect.stage is Stage.MECHANISM]
     tree, mode = simulator.tree, recording.description.controller.mode
-    left = [line for drive in drives for line in drive.not_in([*_held(drive, mode), *mechanical])]
+    left = [
+        line
+        for drive in drives
+        for line in drive.not_in([*OF_JOINT, *mechanical, *(OF_LOOP[_is_servo(drive)] if mode == "position" else ())])
+    ]
     step = recording.step / ceil(recording.step / STEP - 1e-6)
+    followers = [
+        f'    <joint joint1="{escape(name)}" joint2="{escape(tree.joint_names[tree.follow[k]])}" '
+        f'polycoef="{numbers["offset"][k]:.12g} {numbers["ratio"][k]:.12g} 0 0 0" solref="0.002 1"/>'
+        for k, name in enumerate(tree.dof_names)
+        if name not in tree.joint_names
+    ]
     parts = [
         f'<mujoco model="{escape(recording.name)}">',
         *(f"  <!-- {line} -->" for line in _said(left, drives, mode)),
@@ -53,20 +67,13 @@ def as_mjcf(model: ModelFile, recording: Recording) -> tuple[str, list[str]]:
         "  <worldbody>",
         *_bodies(tree, numbers, {drive.name: drive for drive in drives}, -1, 2),
         "  </worldbody>",
-        *_equalities(tree, numbers),
+        *(["  <equality>", *followers, "  </equality>"] if followers else []),
         "  <actuator>",
         *(f"    {_actuator(drive, mode, step)}" for drive in drives),
         "  </actuator>",
         "</mujoco>",
     ]
     return "\n".join([*parts, ""]), left
-
-
-def _held(drive: JointDrive, mode: Mode) -> tuple[str, ...]:
-    """What the joint and its actuator hold."""
-    if mode != "position":
-        return OF_JOINT
-    return (*OF_JOINT, "stall", "no_load", "rate") if _is_servo(drive) else (*OF_JOINT, "bias")
 
 
 def _is_servo(drive: JointDrive) -> bool:
@@ -113,29 +120,14 @@ def _joint(tree: RigidBodyTree, k: int, drive: JointDrive | None) -> str:
     if isfinite(tree.lower[k]) and isfinite(tree.upper[k]) and tree.lower[k] < tree.upper[k]:
         words.append(f'range="{tree.lower[k]:.12g} {tree.upper[k]:.12g}"')
     if drive is not None:
-        words += [f'{key}="{value:.12g}"' for key, value in _of_joint(drive) if value]
+        held = {
+            "armature": max(drive.armature, 0.0),
+            "frictionloss": max(drive.friction, 0.0),
+            "damping": drive.damping,
+        }
+        words += [f'{key}="{value:.12g}"' for key, value in held.items() if value]
         words += [DRY] if drive.friction > 0.0 else []
     return f"<joint {' '.join(words)}/>"
-
-
-def _of_joint(drive: JointDrive) -> list[tuple[str, float]]:
-    return [
-        ("armature", max(drive.armature, 0.0)),
-        ("frictionloss", max(drive.friction, 0.0)),
-        ("damping", drive.damping),
-    ]
-
-
-def _equalities(tree: RigidBodyTree, numbers: dict[str, Array]) -> Iterator[str]:
-    """Joints that follow another one."""
-    lines = [
-        f'    <joint joint1="{escape(name)}" joint2="{escape(tree.joint_names[tree.follow[k]])}" '
-        f'polycoef="{numbers["offset"][k]:.12g} {numbers["ratio"][k]:.12g} 0 0 0" solref="0.002 1"/>'
-        for k, name in enumerate(tree.dof_names)
-        if name not in tree.joint_names
-    ]
-    if lines:
-        yield from ("  <equality>", *lines, "  </equality>")
 
 
 def _actuator(drive: JointDrive, mode: Mode, step: float) -> str:
@@ -168,3 +160,27 @@ def _motor(constant: float, torque: float) -> str:
 
 def _list(values: Array) -> str:
     return " ".join(f"{value:.12g}" for value in values)
+
+
+def as_urdf(model: ModelFile, recording: Recording) -> tuple[str, list[str]]:
+    """Return the recording's URDF with <dynamics> and efforts of the model, and what it does not hold, a line each."""
+    drives = drives_of(model)
+    left = [line for drive in drives for line in drive.not_in(("torque_limit", "friction", "damping"))]
+    robot = robot_of(recording.urdf)
+    by_name = {drive.name: drive for drive in drives}
+    for joint in robot.findall("joint"):
+        if (drive := by_name.get(str(joint.get("name")))) is None:
+            continue
+        for old in joint.findall("dynamics"):
+            joint.remove(old)
+        values = {"damping": f"{drive.damping:.12g}", "friction": f"{max(drive.friction, 0.0):.12g}"}
+        joint.append(ElementTree.Element("dynamics", values))
+        if isfinite(drive.torque_limit):
+            limit = joint.find("limit")
+            if limit is None:
+                limit = ElementTree.SubElement(joint, "limit", {"velocity": "0"})
+            limit.set("effort", f"{drive.torque_limit:.12g}")
+    for line in reversed(["by tactile_cube.export", *(f"not held: {one}" for one in left)]):
+        robot.insert(0, ElementTree.Comment(f" {line.replace('--', '- -')} "))
+    ElementTree.indent(robot)
+    return ElementTree.tostring(robot, encoding="unicode") + "\n", left
