@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import polars
 from PIL import Image
-from playwright.sync_api import Locator, Page
+from playwright.sync_api import Page
 
 from benchmarks.browser import processor_seconds, workbench
 
@@ -57,7 +57,7 @@ class Walk:
     """Somebody at the page, whose actions are counted."""
 
     def __init__(self, page: Page, out: Path | None) -> None:
-        self.page, self.out, self.actions, self.pictures = page, out, 0, 0
+        self.page, self.out, self.actions = page, out, 0
 
     def drop(self, logs: Logs) -> None:
         """Files onto the page."""
@@ -79,14 +79,15 @@ class Walk:
         self.page.get_by_label(label).fill(text)
         self.actions += 1
 
-    def picture(self, name: str, top: Locator | None = None, height: float = 860.0) -> None:
-        """The window, scrolled to a part, in few colours."""
+    def picture(self, name: str, height: float, heading: str = "", half: bool = False) -> None:
+        """The window from a heading on, or the right half of it, in few colours."""
         if self.out is None:
             return
-        self.page.wait_for_timeout(1500)
-        box = None if top is None else top.bounding_box()
-        y = box["y"] + self.page.evaluate("scrollY") - 8.0 if box else 0.0
-        shot = self.page.screenshot(full_page=True, clip={"x": 0.0, "y": y, "width": 1280.0, "height": height})
+        self.page.wait_for_timeout(3000)
+        top = self.page.get_by_role("heading", name=heading, exact=True).bounding_box() if heading else None
+        y = top["y"] + self.page.evaluate("scrollY") - 8.0 if top else 0.0
+        x, width = (768.0, 512.0) if half else (0.0, 1280.0)
+        shot = self.page.screenshot(full_page=True, clip={"x": x, "y": y, "width": width, "height": height})
         whole = Image.open(io.BytesIO(shot)).convert("RGB")
         whole.quantize(COLORS, dither=Image.Dither.NONE).save(self.out / f"workbench_{name}.png", optimize=True)
 
@@ -113,32 +114,31 @@ def main() -> None:
             walk.type("its firmware's gain", "16")
         else:
             walk.choose("commands are", "torque")
-        walk.picture("import", height=760.0)
+        walk.picture("import", 670.0)
         walk.click("Import")
         page.get_by_role("radio").first.wait_for()
         say("imported, candidates ranked")
-        walk.picture("compare")
         page.get_by_role("radio").first.check()
         walk.actions += 1
         page.get_by_text("error over noise would").wait_for()
-        walk.picture("candidate")
+        walk.picture("candidate", 860.0)
         walk.click("Diagnose")
         page.get_by_text("best so far").wait_for()
         page.get_by_text("% done").wait_for()
         page.locator("pre").wait_for()
         say("diagnosed")
         print(page.locator("pre").inner_text())
-        head = page.get_by_role("heading", name="Diagnosis", exact=True)
-        walk.picture("diagnosis", head)
+        walk.picture("diagnosis", 620.0, "Diagnosis")
         if not page.get_by_role("button", name="Add what it found").is_disabled():
             walk.click("Add what it found")
             page.get_by_role("cell", name="+ ").first.wait_for()
             page.get_by_role("radio").first.wait_for()
             say("added")
-            walk.picture("added")
+            walk.picture("added", 720.0)
+            walk.picture("stages", 320.0, "Error by stage", half=True)
             walk.click("Propose")
             page.get_by_role("link", name="Download CSV").or_(page.get_by_text("decides nothing")).wait_for()
-            walk.picture("next", page.get_by_role("heading", name="Error by stage"))
+            walk.picture("next", 560.0, "Next experiment", half=True)
         walk.click("Save")
         page.get_by_text("and report.html").wait_for()
         say("saved")

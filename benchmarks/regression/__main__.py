@@ -85,7 +85,7 @@ def main() -> None:
         with answers.open("a") as lines:
             lines.write(json.dumps(one) + "\n")
         failed |= OUTCOMES.index(one["outcome"]) > OUTCOMES.index(one["expects"])
-        line = f"{one['seed']} {one['truth']} -> {one['answer']} {one['rivals'] or ''}"
+        line = f"{one['seed']} {one['truth']} -> {one['answer']} {one['named']}"
         print(f"{line} {one['outcome']} ({one['why']}), unseen {one['unseen']}, {one['seconds']} CPU s", flush=True)
     if args.keep:
         keep(answers, args.keep)

@@ -16,7 +16,7 @@ from tactile_cube.identification.search.candidates import Candidate
 from tactile_cube.identification.search.evidence import Judgement, gain, p_value
 from tactile_cube.identification.search.explanation import Explanation, named
 from tactile_cube.identification.search.findings import Findings
-from tactile_cube.identification.verdict import Verdict, decide
+from tactile_cube.identification.verdict import decide
 from tactile_cube.measurement.replay.model import Model, Term
 
 DIGITS = 6
@@ -39,18 +39,16 @@ def stored(findings: Findings) -> dict[str, Any]:
     }
 
 
-def decided(table: Mapping[str, Any], criteria: Criteria, strength: float = 1.0) -> tuple[str, list[list[str]]]:
-    """The verdict's kind by these statistics, and the effects of the chosen set and of its rivals, NAME@JOINT.
+def decided(table: Mapping[str, Any], criteria: Criteria, strength: float = 1.0) -> tuple[str, list[list[str]], float]:
+    """The verdict's kind by these statistics, the effects of the chosen set and its rivals, and the base model's error.
 
     Had what is hidden been of another `strength`, all that is more than noise would be as many times as large squared.
     """
-    return answer(decide(_findings(table, strength), criteria))
-
-
-def answer(verdict: Verdict) -> tuple[str, list[list[str]]]:
-    """A verdict's kind, and the effects that it names."""
+    found = _findings(table, strength)
+    verdict = decide(found, criteria)
     sets = (verdict.chosen, *verdict.rivals) if verdict.kind not in ("adequate", "unknown_effect") else ()
-    return verdict.kind, [sorted(f"{name}@{joint}" for name, joint in named(one)) for one in sets]
+    named_in = [sorted(f"{name}@{joint}" for name, joint in named(one)) for one in sets]
+    return verdict.kind, named_in, found.base.largest_error
 
 
 def _judged(one: Judgement) -> dict[str, Any]:
@@ -107,8 +105,9 @@ def _explanation(table: Mapping[str, Any], one: Mapping[str, Any], strength: flo
         candidates.append(Candidate(effect, tuple(entry["joints"]), dict.fromkeys(entry["form"], 0.0)))
     model = Model({}, tuple(terms), {})
     samples, errors = np.array(table["samples"]), np.array(one["joint_errors"])
-    costs = samples + strength**2 * (np.array(one["costs"]) - samples)
-    errors = np.sqrt(1.0 + strength**2 * (errors**2 - 1.0))
+    costs = np.array(one["costs"])
+    costs = costs + (strength**2 - 1.0) * np.maximum(costs - samples, 0.0)
+    errors = np.sqrt(errors**2 + (strength**2 - 1.0) * np.maximum(errors**2 - 1.0, 0.0))
     judgement = Judgement(model, costs, samples, NOTHING, errors, np.array(table["trial"]))
     fit = Fit(model, tuple(unknowns), float(costs.sum()), 0.0, NOTHING, NOTHING, NOTHING)
     return Explanation(tuple(candidates), fit, judgement, one["p_value"], one["gain"])

@@ -28,25 +28,31 @@ def test_a_margin_that_lets_a_command_leave_the_limits_is_refused(margin: float)
 
 EVIDENCE = json.loads(gzip.decompress(Path(__file__).with_name("evidence.json.gz").read_bytes()))
 """What held-out trials said of a dozen spent draws of benchmarks/regression, and the answer to each."""
-DECIDING = ("floor", "adequate", "tolerated", "least_gain", "detail", "band", "significant", "most", "nearly_whole")
+STRENGTHS = (2.0, 1.0, 0.4, 0.2, 0.1, 0.05)  # of what is hidden, in units of what was
+SHOWS = 1.1  # [sensor noise] error of the model with refitted constants from which on something shows
+ADEQUATE = ("adequate", [])
+DECIDING = ("floor", "adequate", "least_gain", "detail", "band", "significant", "most", "nearly_whole")
+"""`tolerated` decides in test_verdict, `margin` in test_safe_commands, `most_simulated` in search/test_findings."""
 
 
-def missed(criteria: Criteria) -> list[str]:
-    """Draws whose answer these criteria change."""
-    return [
-        seed
-        for seed, table in EVIDENCE.items()
-        if decided(table["evidence"], criteria) != (table["verdict"], table["named"])
-    ]
+def missed(criteria: Criteria) -> list[tuple[str, float]]:
+    """Draws and strengths that are answered otherwise than by what is hidden, or by nothing where it does not show."""
+    found = []
+    for seed, table in EVIDENCE.items():
+        for strength in STRENGTHS:
+            kind, named, error = decided(table["evidence"], criteria, strength)
+            known = (table["verdict"], table["named"]) if error > SHOWS else ADEQUATE
+            found += [(seed, strength)] if (kind, named) != known else []
+    return found
 
 
 def test_a_dozen_recordings_with_known_answers_are_answered_by_what_was_measured_of_them() -> None:
     assert len(EVIDENCE) >= 12
-    assert len({table["verdict"] for table in EVIDENCE.values()}) >= 4
+    assert {table["verdict"] for table in EVIDENCE.values()} >= {"adequate", "missing_effect", "ambiguous"}
     assert missed(STANDARD) == []
 
 
 @pytest.mark.parametrize("name", DECIDING)
-def test_each_deciding_number_decides_twice_or_half_of_it_changes_an_answer(name: str) -> None:
+def test_twice_or_half_of_each_deciding_number_misses_an_answer(name: str) -> None:
     number = getattr(STANDARD, name)
     assert missed(replace(STANDARD, **{name: 2.0 * number})) or missed(replace(STANDARD, **{name: 0.5 * number}))

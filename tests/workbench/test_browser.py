@@ -159,7 +159,7 @@ def test_from_dropped_logs_to_the_error_at_the_noise(
     window.get_by_text("what stribeck_friction@a would supply").wait_for(state="hidden")
     window.get_by_text("error over noise would fall").wait_for()
     window.get_by_text("Confused with: backlash and elasticity").wait_for()
-    assert window.get_by_label("over", exact=True).input_value() == "velocity of a [rad/s]"
+    assert window.get_by_label("over", exact=True).input_value() == "velocity of a [deg/s]", "as logged"
     picture(window, "3_candidate")
     window.get_by_role("button", name="Add and refit").click()
     window.get_by_role("cell", name=f"+ {STRIBECK}").wait_for()
@@ -323,7 +323,8 @@ def test_a_diagnosis_is_stopped_in_the_middle_and_another_one_answers(
 ) -> None:
     open_recording(window, measured)
     window.get_by_role("button", name="Diagnose").click()
-    window.get_by_text("nothing yet; the refitted model leaves").wait_for()
+    window.get_by_text("best so far: ").wait_for()
+    window.get_by_text("% done in").wait_for()
     window.get_by_role("button", name="Stop").click()
     window.get_by_text("stopped", exact=True).wait_for()
     assert window.get_by_role("button", name="Add what it found").is_disabled()

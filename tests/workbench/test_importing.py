@@ -56,6 +56,14 @@ def test_without_a_column_of_commands_it_may_be_a_swing(tmp_path: Path) -> None:
     assert "no column of commands" in seen.doubt
 
 
+def test_without_a_column_of_commands_torques_are_the_commands(tmp_path: Path) -> None:
+    (tmp_path / "driven.csv").write_text("time,torque,position\n0,0.1,0.1\n0.01,0.2,0.2\n")
+    seen = Waiting((tmp_path / "driven.csv",), robot="pendulum").preview()
+    assert seen is not None
+    assert (seen.mode, known(seen.guess["pendulum"])) == ("torque", {"command": "torque", "position": "position"})
+    assert "torques are taken for the commands" in seen.doubt
+
+
 def test_columns_that_are_said_are_taken(tmp_path: Path) -> None:
     swapped = {"time": "t", "a": {"command": "b_cmd", "position": "b_pos"}}
     given = waiting(tmp_path, HEAD + "\n".join(ROWS)).settings | {"controller": GAINS, "columns": swapped}
@@ -182,11 +190,10 @@ def test_two_gains_of_one_joint_are_refused_and_named(tmp_path: Path) -> None:
         import_logs(tmp_path / "out", given)
 
 
-@pytest.mark.parametrize("length", [0.0, 1e-9, -1.0])
-def test_trials_of_no_length_are_refused(tmp_path: Path, length: float) -> None:
+def test_trials_of_no_length_are_refused(tmp_path: Path) -> None:
     polars.DataFrame(played("pendulum")).write_csv(tmp_path / "run.csv")
-    given = Waiting((tmp_path / "run.csv",), robot="wheel").settings | {"length": length}
-    with pytest.raises(InputError, match=rf"source.length={length:g}: pieces need 20 rows"):
+    given = Waiting((tmp_path / "run.csv",), robot="wheel").settings | {"length": 1e-9}
+    with pytest.raises(InputError, match=r"source.length=1e-09: pieces need 20 rows"):
         import_logs(tmp_path / "out", given)
 
 

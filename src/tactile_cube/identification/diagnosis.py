@@ -122,8 +122,9 @@ def diagnose_recording(
     recording = in_steps(recording, effects, known, say)
     whole = Inquiry(recording, effects, seed, say, known, criteria)
     standard = fit_standard_model(*whole.parts[:2], noise_with_links(recording), known, effects)
-    say.answer, say.following = standard.sentence(common_unit(recording.units.values())), "its constants alone"
-    say(say.answer)
+    first = standard.sentence(common_unit(recording.units.values()))
+    say.answer, say.following = first.partition(";")[0], "the stated model with its constants refitted"
+    say(first)
     inquiry, left_out, suspected = beside_disturbances(whole)
     search, findings, simulations, verdict = inquiry.answer
     if findings.stopped:
@@ -222,13 +223,9 @@ def open_fits(diagnosis: Diagnosis) -> dict[str, Fit]:
 def test_errors(
     search: Search, test: Recording, models: Mapping[str, Model], step: float
 ) -> tuple[dict[str, ErrorSummary], dict[str, float]]:
-    """Free-running errors of the model as stated and of others [rad], and their errors of segments over the noise.
+    """Free-running errors of the model as stated and of fitted ones [rad], and errors of their segments over the noise.
 
-    Args:
-        search: cuts trials into segments.
-        test: trials to test by.
-        models: fitted; the joint offsets of initialisations that they have not seen are fitted here.
-        step: its simulation step [s].
+    Joint offsets of initialisations that a model has not seen are fitted; `step` is that of the free runs [s].
     """
     problem = Problem(search.shooting, search.windows(test))
     stated = nominal_model(test, search.known)
@@ -265,13 +262,7 @@ class Unseen(NamedTuple):
 
 
 def unseen(effects: Sequence[type[Effect]], sizes: Mapping[str, Scales], named: Collection[str]) -> tuple[Unseen, ...]:
-    """Effects that no trial of a recording could show.
-
-    Args:
-        effects: the catalogue.
-        sizes: joint -> its sizes in the recording.
-        named: effects that were seen all the same, NAME@JOINT.
-    """
+    """Effects that no trial of a recording with joints of these sizes could show, but for those that were `named`."""
     found = (
         Unseen(effect_path(e), joint, why) for e in effects for joint, s in sizes.items() if (why := e.unseen_at(s))
     )

@@ -140,8 +140,8 @@ class MultiSyncCollection:
     """Worker processes, each a `SingleCollection` of several worlds, that collect while the learner updates.
 
     Weights are in memory that all share: the learner writes them while the workers wait. A worker that is killed is
-    noticed at once, one that hangs after the time limit of the settings; TorchRL's own `MultiSyncCollector` waits for
-    either for ever.
+    noticed at once, one that hangs after the time limit of the settings. TorchRL's own `MultiSyncCollector` would wait
+    for ever for a worker that hangs, and to send weights to a dead one.
 
     Raises:
         CollectionError: a worker failed, died or got stuck, here or in any method.

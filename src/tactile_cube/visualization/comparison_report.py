@@ -35,7 +35,7 @@ def summary(comparison: Comparison) -> str:
     sources = {
         "contact": "what a world with the true effects leaves of a grasp",
         "repeats": f"scatter of {floor.repeats} repeats",
-        "guess": "sensor noise, a guess: no repeats",
+        "guess": f"sensor noise, a guess: {'repeats drift' if floor.drift else 'no repeats'}",
     }
     lines = [
         outcome(comparison),
@@ -65,7 +65,6 @@ def outcome(comparison: Comparison) -> str:
     head = (
         f"The simulated joints are {milli(comparison.errors.overall, unit)} (RMS) away from the measured ones; "
         f"{milli(comparison.floor.overall, unit)} would be noise alone."
-        + "".join(f" {one.sentence(unit)}." for one in comparison.floor.drift)
     )
     if comparison.diverged:
         return (

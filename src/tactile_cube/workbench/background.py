@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import re
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -19,10 +20,11 @@ from tactile_cube.errors import InputError
 from tactile_cube.identification.fitting.intervals import Fitted
 from tactile_cube.measurement.recordings.recording import Recording
 
-BEST = "best so far: "
+ANSWER = "best answer so far: "
+REFITTED = re.compile(r" +(?:held-out error +)?(\d[\d.]*)  (.*@.*)")  # error over noise, and which effects leave it
 PHASES = {
-    "steps of simulation a sample": 0.05, "base refitted": 0.15, "starts of": 0.25, BEST: 0.5,
-    "  held-out error": 0.75, "verdict": 0.9,
+    "steps of simulation a sample": 0.05, "base refitted": 0.15, "starts of": 0.3, "  held-out error": 0.7,
+    "verdict": 0.9,
 }  # fmt: skip
 """What lines of a diagnosis contain -> which share of its time has gone by then, about."""
 LOOK = 2.0  # [s] between two looks at the clock while it says nothing
@@ -53,6 +55,7 @@ class Diagnosing:
         self.said: list[str] = []
         self.share, self.best, self._began = 0.0, "nothing yet", time.monotonic()
         self.found: Found | None = None
+        self._least = float("inf")
         self.stopped = False
         context = multiprocessing.get_context("spawn")
         self._receiver, sender = context.Pipe(duplex=False)
@@ -93,10 +96,12 @@ class Diagnosing:
     def _add(self, line: str) -> None:
         self.said += [line] if line else []
         self.share = max([self.share, *(share for words, share in PHASES.items() if words in line)])
-        if line.startswith(BEST):
-            self.best = line.removeprefix(BEST)
-        elif line.startswith("base refitted: "):
+        if line.startswith("base refitted: "):
             self.best = f"nothing yet; the refitted model leaves {line.rpartition('error ')[2]}"
+        elif line.startswith(ANSWER):
+            self.best = line.removeprefix(ANSWER).partition("; next: ")[0]
+        elif (fitted := REFITTED.fullmatch(line)) and float(fitted[1]) < self._least:
+            self._least, self.best = float(fitted[1]), f"{fitted[2]} leaves {fitted[1]} x sensor noise"
 
     def wait(self) -> Found | None:
         """Return the answer when it has come; None: stopped."""

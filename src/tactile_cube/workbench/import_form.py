@@ -9,8 +9,7 @@ from bokeh.models import Row, SVGIcon, Toggle
 
 from tactile_cube.measurement.sources import units
 from tactile_cube.measurement.sources.column_map import NEEDED
-from tactile_cube.measurement.sources.lever import ROBOTS
-from tactile_cube.measurement.sources.mechanism import servos
+from tactile_cube.measurement.sources.mechanism import ROBOTS, servos
 from tactile_cube.workbench.desk import Desk
 from tactile_cube.workbench.importing import Preview
 from tactile_cube.workbench.tables import CELL, HEAD, ROW, TABLE

@@ -22,8 +22,8 @@ from tactile_cube.measurement.recordings.tables import read_table
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable, require_free, write_recordings
 from tactile_cube.measurement.sources.column_map import map_columns
 from tactile_cube.measurement.sources.csv_files import kinds_of
-from tactile_cube.measurement.sources.lever import Lever
 from tactile_cube.measurement.sources.log_file import LEROBOT, READERS, read_logs
+from tactile_cube.measurement.sources.mechanism import Lever
 from tactile_cube.measurement.sources.source import recording_tables, source_settings
 from tactile_cube.untrusted_file import below
 from tactile_cube.whole_file import write_whole
@@ -35,7 +35,12 @@ NAME = 200
 LOGS, RIGS = tuple(READERS), (".urdf", ".xml")
 BAGS = (".mcap", ".bag", ".db3")
 SHOWN = 5  # rows
-FREE = "no column of commands: free swings? If torques are commanded or logged, say which column it is"
+DOUBTS = {
+    "position": "",
+    "torque": "no column of commands: the torques are taken for the commands; if nothing drove the joint, say free",
+    "free": "no column of commands: free swings? If torques are commanded or logged, say which column it is",
+}
+"""Mode of a controller, in the order in which they are tried -> what its columns leave open."""
 WORDS = ("servo", "controller.mode", "read", "time_unit", "angle_unit", "length_unit", "torque_unit")
 """Settings of `record source=csv` that are no numbers."""
 
@@ -92,13 +97,14 @@ class Waiting:
         joints = [name for name, joint in rig.joints.items() if joint.mimics is None]
         names, count = list(table), min(SHOWN, len(next(iter(table.values()))))
         rows = [[float(column[k]) for column in table.values()] for k in range(count)]
-        guess, mode, doubt = None, "position", ""
-        try:
-            guess = map_columns(names, joints, {})
-        except InputError as error:
-            doubt = str(error)
-            with contextlib.suppress(InputError):
-                guess, mode, doubt = map_columns(names, joints, {}, "free"), "free", FREE
+        guess, refused = None, list[str]()
+        for mode in DOUBTS:
+            try:
+                guess = map_columns(names, joints, {}, mode)
+                break
+            except InputError as error:
+                refused.append(str(error))
+        mode, doubt = (mode, DOUBTS[mode]) if guess else ("position", refused[0])
         known = guess.joints if guess else {}
         chosen = {joint: {signal: known.get(joint, {}).get(signal, "") for signal in SIGNALS} for joint in joints}
         time = {"time": {"time": (guess.time if guess else None) or ""}}

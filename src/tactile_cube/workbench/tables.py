@@ -18,7 +18,11 @@ WORSE = "worse than before: Undo takes it back"
 NO_BETTER = "no better than before"
 BAR = Html('<td style="width:40%"><div style="background:{};width:{:.1f}%;height:1em"></div></td>')
 ROW, TABLE = Html("<tr>{}</tr>"), Html('<table cellpadding="4" style="{}">{}</table>')
-CELL, HEAD, NUMBER = Html("<td>{}</td>"), Html("<th>{}</th>"), Html("<td style='text-align:right'>{}</td>")
+CELL, HEAD, NUMBER = (
+    Html("<td>{}</td>"),
+    Html("<th>{}</th>"),
+    Html("<td style='text-align:right;white-space:nowrap'>{}</td>"),
+)
 BLUE, ORANGE = "#9cc6e6", "#f0b08a"
 FOLDED = Html('<details style="color:#57606a"><summary>{}</summary>{}</details>')
 CARD = Html('<div style="border:1px solid #d0d7de;border-radius:6px;padding:6px 10px"><b>{}</b>{}{}{}</div>')

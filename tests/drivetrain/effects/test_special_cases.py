@@ -3,11 +3,13 @@
 from collections.abc import Mapping
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from tactile_cube.drivetrain.effects import Effect, Stage, catalogue
+from tactile_cube.drivetrain.effects import Effect, Stage, catalogue, find_effect
 from tactile_cube.drivetrain.signals import DAMPING, FRICTION, LEAD, LOOP_GAIN, LOOSE_TORQUE, ROWS, TIME, VELOCITY
+from tactile_cube.errors import InputError
 
 Law = type[Effect]
 STEPS, STEP = 24, 0.01
@@ -77,3 +79,8 @@ def test_every_stated_value_is_one_of_a_number_that_a_search_fits() -> None:
             for key, value in values.items():
                 assert any(key in form for form in (law.forms or (own,)))
                 assert value in (own[key].neutral, float("inf"))
+
+
+def test_a_law_of_ones_own_that_names_simpler_ones_without_values_is_refused() -> None:
+    with pytest.raises(InputError, match=r"contains is \('coulomb_friction',\); give the values where"):
+        type("Rubbing", (find_effect("coulomb_friction"),), {"contains": ("coulomb_friction",)})

@@ -325,3 +325,18 @@ def test_columns_left_aside_are_named_when_nothing_fits(tmp_path: Path) -> None:
     frame = polars.DataFrame({"t": [0.0] * 30, "cmd": [0.0] * 30, "pos": ["off"] * 30}).write_csv()
     with pytest.raises(InputError, match=r"no joint of the URDF has both.*\(pos: no numbers, left out\)"):
         imported(tmp_path, {"log.csv": frame}, ONE_JOINT)
+
+
+def test_a_start_in_motion_counts_in_no_error_for_its_commands_are_unknown(tmp_path: Path) -> None:
+    moving = one_joint()
+    held = {name: np.concatenate([np.full(60, values[0]), values]) for name, values in moving.items()}
+    held["t"] = np.arange(360) / 100.0
+    recording = imported(tmp_path, {"moving.csv": moving, "held.csv": held}, ONE_JOINT)
+    begun, rested = (next(t for t in recording.trials if t.name == name) for name in ("moving", "held"))
+    assert not begun.valid[:40].any()
+    assert begun.valid[40:].all()
+    assert rested.valid.all()
+    swing = imported(
+        tmp_path / "torque", {"moving.csv": moving}, ONE_JOINT, controller={"mode": "torque"}, torque_unit="Nm"
+    )
+    assert swing.trials[0].valid.all(), "torques act at once"

@@ -156,6 +156,11 @@ class Effect:
             lacks = ["a static method configure(view, place, p)"]
         if not lacks and cls.stage.value >= 0 and not cls.defines("law"):
             lacks = ["a static method law(x, j, p, s, dt)"]
+        if not isinstance(cls.contains, Mapping):
+            given = f"effect class {cls.__module__}.{cls.__qualname__}: contains is {cls.contains!r}"
+            raise InputError(
+                f"{given}; give the values where it becomes each simpler effect, {{'NAME': {{'KEY': 0.0}}}}"
+            )
         if lacks:
             raise InputError(f"effect class {cls.__module__}.{cls.__qualname__} lacks {', '.join(lacks)}")
 

@@ -60,7 +60,7 @@ def judge(problem: Problem, held_out: Recording, model: Model) -> Judgement:
     fitted = fit(problem, model, offset_unknowns(held_out, problem.shooting.sizes), iterations=3)
     samples = np.count_nonzero(problem.weight, axis=1)
     costs = charged(problem.cost(fitted.residual), samples, problem.chosen_numbers(fitted.model))
-    joints = _joint_errors(problem, fitted.residual)
+    joints = joint_errors(problem, fitted.residual)
     squares = np.maximum(_joint_squares(problem, fitted.residual)[0], 0.0)
     shares = squares / np.maximum(squares.sum(axis=1, keepdims=True), np.finfo(float).tiny)
     trial = problem.segment_trial
@@ -79,7 +79,7 @@ def charged(costs: Array, samples: NDArray[np.int64], numbers: NDArray[np.int64]
     return np.asarray(costs + excess * ((independent / (independent - numbers)) ** 2 - 1.0))
 
 
-def _joint_errors(problem: Problem, residual: Array) -> Array:
+def joint_errors(problem: Problem, residual: Array) -> Array:
     """RMS (n,) of the residual of each joint's sensors with the starts of segments taken out."""
     squares, present = _joint_squares(problem, residual)
     return np.asarray(np.sqrt(np.maximum(squares.sum(axis=0), 0.0) / np.maximum(present.sum(axis=0), 1)))

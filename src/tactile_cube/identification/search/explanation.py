@@ -106,6 +106,11 @@ class Proposal:
     effects: tuple[Candidate, ...]
     fit: Fit = field(repr=False)
 
+    @property
+    def label(self) -> str:
+        """Readable."""
+        return " & ".join(c.label for c in self.effects) or "the refitted model"
+
     def price(self, criteria: Criteria) -> float:
         """Squared error, with as much for each number as an effect has to explain at least."""
         return float(self.fit.cost / (1.0 - criteria.least_gain) ** sum(one.size for one in self.effects))

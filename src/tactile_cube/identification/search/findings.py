@@ -116,7 +116,7 @@ def proposed(search: Search) -> tuple[list[Proposal], Looks | None]:
         first = first or looks
         if not looks.tried:
             break
-        search.say(f"{len(looks.scores)} starts of {len(looks.tried)} laws beside {parent_label(parent)}")
+        search.say(f"{len(looks.scores)} starts of {len(looks.tried)} laws beside {parent.label}")
         tried = [one for one in grown(search, looks) if len(one.effects) <= MOST]
         tried += [richer for richer in (detailed(search, one) for one in tried[:1]) if richer]
         tried.sort(key=lambda one: one.price(search.criteria))
@@ -124,8 +124,7 @@ def proposed(search: Search) -> tuple[list[Proposal], Looks | None]:
         if not tried or tried[0].price(search.criteria) >= parent.price(search.criteria):
             break
         parent = tried[0]
-        left = f"{parent_label(parent)} ({search.over_noise(parent.fit):.2f} x sensor noise on fitted trials)"
-        search.stand(left, "one effect more, and each one taken out")
+        search.say.following = "one effect more, and each one taken out"
     return [*found, *reduced(search, parent)], first
 
 
@@ -197,11 +196,6 @@ def simpler_laws(search: Search, chosen: Explanation, place: int) -> set[str]:
         for key, value, half, high in reach
         if key in values and abs(min(values[key], high) - value) <= half
     }
-
-
-def parent_label(one: Proposal) -> str:
-    """In words."""
-    return " & ".join(c.label for c in one.effects) or "the refitted model"
 
 
 Array = NDArray[np.float64]

@@ -21,7 +21,7 @@ from tactile_cube.identification.search.candidates import (
     with_details,
     without_effect,
 )
-from tactile_cube.identification.search.evidence import segment_errors
+from tactile_cube.identification.search.evidence import joint_errors
 from tactile_cube.identification.search.explanation import Proposal, named_by
 from tactile_cube.identification.search.residual_starts import residual_candidates
 from tactile_cube.identification.search.search import Search, some
@@ -59,15 +59,10 @@ def off(search: Search, one: Fit) -> list[int]:
     Of a set that has explained nearly all of a joint's error, above what is tolerated: a law differs in detail from the
     real thing, and no other law is called for by that.
     """
-    criteria, before = search.criteria, joint_errors(search.problem, search.base.fit)
-    errors = joint_errors(search.problem, one)
+    criteria, before = search.criteria, joint_errors(search.problem, search.base.fit.residual)
+    errors = joint_errors(search.problem, one.residual)
     detail = errors**2 - 1.0 <= (1.0 - criteria.nearly_whole) * (before**2 - 1.0)
     return [int(j) for j in np.flatnonzero(errors > np.where(detail, criteria.tolerated, criteria.floor))]
-
-
-def joint_errors(problem: Problem, one: Fit) -> Array:
-    """RMS error (n,) of a fit at each joint, in units of the sensor noise."""
-    return np.asarray(np.sqrt(np.nanmean(segment_errors(problem, one.residual) ** 2, axis=0)))
 
 
 def look(search: Search, parent: Proposal, at: Sequence[str]) -> Looks:
@@ -132,7 +127,8 @@ def whole(search: Search, found: Sequence[Proposal]) -> bool:
 
 def near(search: Search, looks: Looks, fitted: Fit, found: Sequence[Proposal]) -> bool:
     """Whether a law has come near the best set by its own steps, on few windows."""
-    return over_noise(looks.problem, fitted) ** 2 <= CLOSE * min(search.over_noise(one.fit) for one in found) ** 2
+    left = fitted.cost / np.count_nonzero(looks.problem.weight)
+    return bool(left <= CLOSE * min(search.over_noise(one.fit) for one in found) ** 2)
 
 
 def explains_most(search: Search, looks: Looks, fitted: Fit) -> bool:
@@ -148,18 +144,17 @@ def further(looks: Looks, fitted: Fit) -> Fit:
     return fit(looks.problem, fitted.model, own, MORE_STEPS, looks.frozen)
 
 
-def over_noise(problem: Problem, fitted: Fit) -> float:
-    """RMS error of a fit in units of the sensor noise."""
-    return float(np.sqrt(fitted.cost / np.count_nonzero(problem.weight)))
-
-
 def refitted(search: Search, looks: Looks, laws: Sequence[tuple[Candidate, Fit]]) -> Proposal:
     """A set with some laws more, each at its own fit to begin with, everything free."""
     known = len(looks.frozen.model.terms)
     terms = [term for _, fitted in laws for term in fitted.model.terms[known:]]
     model = replace(looks.frozen.model, terms=(*looks.frozen.model.terms, *terms))
     one = Proposal((*looks.parent.effects, *(candidate for candidate, _ in laws)), search.refitted(model))
-    search.say(f"  {search.over_noise(one.fit):8.3f}  {' & '.join(c.label for c in one.effects)}")
+    left = search.over_noise(one.fit)
+    if left < search.least:
+        search.least = left
+        search.stand(f"{one.label} ({left:.2f} x sensor noise on fitted trials)", "other laws and pairs of them")
+    search.say(f"  {left:8.3f}  {one.label}")
     return one
 
 
@@ -190,15 +185,9 @@ def sets(looks: Looks) -> list[tuple[tuple[Candidate, Fit], ...]]:
         gained = press(gradient[:, rows], gram[part], expected)
         if gained > alone[rows].max():
             found.append((gained, tuple(laws[k] for k in rows)))
-    found.sort(key=lambda one: -one[0])
-    return distinct([one for _, one in found])
-
-
-def distinct(found: Sequence[tuple[tuple[Candidate, Fit], ...]]) -> list[tuple[tuple[Candidate, Fit], ...]]:
-    """The first of those that name the same effects."""
     first: dict[frozenset[tuple[str, str]], tuple[tuple[Candidate, Fit], ...]] = {}
-    for laws in found:
-        first.setdefault(named_by([candidate for candidate, _ in laws]), laws)
+    for _, together in sorted(found, key=lambda one: -one[0]):
+        first.setdefault(named_by([candidate for candidate, _ in together]), together)
     return list(first.values())
 
 

@@ -59,14 +59,9 @@ class Missing:
 def missing_torques(
     problem: Problem, recording: Recording, model: Model, residual: Array, time: float | None = None
 ) -> list[Missing]:
-    """The torque that each joint would have to get so that the residual vanished: I r'' + D r' + K r.
+    """The torque that each joint would have to get so that a weighted residual (G, R) vanished: I r'' + D r' + K r.
 
-    Args:
-        problem: the windows that the residual belongs to.
-        recording: names the joints.
-        model: gives inertia and gains.
-        residual: (G, R) weighted measured - predicted.
-        time: half width of the windows in which it is differentiated [s]; None: the usual one of the machine.
+    It is differentiated in windows of half width `time` [s], by default the usual one of the machine.
     """
     n, segment = len(recording.joints), problem.windows.segment
     weight, measured, left = (

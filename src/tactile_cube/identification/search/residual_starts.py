@@ -50,12 +50,6 @@ def periodic_candidates(
     return found
 
 
-def waves_of(form: Mapping[str, float]) -> tuple[str, str]:
-    """The parameters of a periodic form that multiply its sine and its cosine: the first two beside the harmonic."""
-    first, second = [name for name in form if name != HARMONIC][:2]
-    return first, second
-
-
 def _starts(
     missing: Missing, form: Mapping[str, float], damping: float | None, size: float
 ) -> list[Mapping[str, float]]:
@@ -70,7 +64,7 @@ def _starts(
     speed = missing.signals[f"velocity of {missing.joint} [rad/s]"]
     weight = np.ones_like(position) if damping is None else speed
     starts: list[Mapping[str, float]] = []
-    first, second = waves_of(form)
+    first, second = [name for name in form if name != HARMONIC][:2]
     for harmonic, sine, cosine in peaks(position, missing.torque, weight, missing.initialisation, size):
         if damping is not None:  # damping * d/dt (a sin + b cos) = damping * n v (a cos - b sin)
             sine, cosine = cosine / (damping * harmonic), -sine / (damping * harmonic)

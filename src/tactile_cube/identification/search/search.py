@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from functools import cached_property
@@ -106,6 +107,7 @@ class Search:
         self.offsets = dict(self.start_held_out.offsets)
         self.free_runs = HeldOut(self.shooting, held_out, noise, self.offsets)
         self.candidates = candidates(self.shooting.sizes, self.effects)
+        self.least = math.inf  # error of the best set so far on fitted trials [sensor noise]
 
     @cached_property
     def base(self) -> Explanation:

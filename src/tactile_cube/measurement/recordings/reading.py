@@ -39,10 +39,11 @@ def read_recording(folder: str | Path) -> Recording:
     """
     folder = Path(folder)
     if not os.path.lexists(folder / DESCRIPTION):
-        what = "no such folder" if not folder.exists() else f"{DESCRIPTION}: no such file"
+        if not folder.exists():
+            raise InputError(f"recording={folder}: no such folder; a recording is a folder with {DESCRIPTION} in it")
         raise InputError(
-            f"recording={folder}: {what}; record makes a recording of logs: source=csv source.files={folder} "
-            "source.urdf=FILE out=FOLDER"
+            f"recording={folder}: {DESCRIPTION}: no such file; of a log, record makes a recording: source=csv "
+            f"source.files={folder} source.urdf=FILE out=FOLDER"
         )
     file = below(folder, DESCRIPTION, f"recording={folder}")
     description = read_schema(file, Description)

@@ -82,9 +82,9 @@ def _frame_log(path: Path) -> Log:
     for name in frame.columns:
         column = frame[name]
         if isinstance(column.dtype, polars.List | polars.Array):
-            expanded = dict(_expanded(name, _stacked(column), names.get(name, ())))
+            expanded, said = _expanded(name, _stacked(column), names.get(name, ()))
             columns |= expanded
-            steps.append(("list column", _from_to(name, expanded)))
+            steps.append(("list column", said))
         else:
             columns[name] = column
     return _log(path, columns, steps, dialect.units if dialect is not None else {})
@@ -99,17 +99,13 @@ def _stacked(column: polars.Series) -> NDArray[Any]:
     return np.asarray(column.list.explode().to_numpy(), dtype=np.float64).reshape(len(column), int(widths[0]))
 
 
-def _expanded(name: str, values: NDArray[Any], names: Sequence[str] = ()) -> Iterator[tuple[str, NDArray[Any]]]:
-    """Columns `name[0]`, `name[1]` ... or `name.NAME` of a table (n, width)."""
-    if values.shape[1] <= WIDEST:
-        known = len(names) == values.shape[1]
-        for k, column in enumerate(values.T):
-            yield f"{name}.{names[k]}" if known else f"{name}[{k}]", np.array(column)
-
-
-def _from_to(name: str, expanded: Mapping[str, Any]) -> str:
-    names = list(expanded)
-    return f"{name}: {names[0]} .. {names[-1]}" if names else f"{name}: not up to {WIDEST} numbers a row, left out"
+def _expanded(name: str, values: NDArray[Any], names: Sequence[str] = ()) -> tuple[dict[str, NDArray[Any]], str]:
+    """Columns `name[0]`, `name[1]` ... or `name.NAME` of a table (n, width), and what to say of them."""
+    width = values.shape[1]
+    if not 0 < width <= WIDEST:
+        return {}, f"{name}: not up to {WIDEST} numbers a row, left out"
+    named = [f"{name}.{one}" for one in names] if len(names) == width else [f"{name}[{k}]" for k in range(width)]
+    return {one: np.array(column) for one, column in zip(named, values.T, strict=True)}, f"{named[0]} .. {named[-1]}"
 
 
 def _log(path: Path, columns: Mapping[str, Any], steps: list[Step], units: Mapping[str, str]) -> Log:
@@ -176,9 +172,9 @@ def _arrays_log(path: Path, arrays: Mapping[str, NDArray[Any]]) -> Log:
         elif one.ndim == 1:
             columns[name] = one
         else:
-            expanded = dict(_expanded(name, one if one.shape[0] == rows else one.T))
+            expanded, said = _expanded(name, one if one.shape[0] == rows else one.T)
             columns |= expanded
-            steps.append(("array", _from_to(f"{name} {'x'.join(map(str, one.shape))}", expanded)))
+            steps.append(("array", f"{'x'.join(map(str, one.shape))}: {said}"))
     constants = {name: float(one) for name, one in numbers.items() if not one.ndim}
     if constants:
         steps.append(("constants", ", ".join(f"{name} {value:g}" for name, value in constants.items())))

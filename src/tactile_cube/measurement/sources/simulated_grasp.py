@@ -64,7 +64,10 @@ class SimulatedGrasp(SimulatedSession):
             known = ", ".join([*HOLDING, *EXCITATIONS])
             raise InputError(f"source.kinds: unknown {sorted(unknown)}; choose from {known}")
         rng = np.random.default_rng(seed)
-        description, urdf = self._description(), DLR_HAND2.urdf()
+        gravity, urdf = DLR_HAND2.rotation.T @ [0.0, 0.0, -9.81], DLR_HAND2.urdf()
+        coupled = {f"{finger.name}_q4": Coupling(joint=f"{finger.name}_q3") for finger in DLR_HAND2.fingers}
+        held = {"size": self.size, "mass": next(iter(self.weights))}
+        description = self.described(gravity.tolist(), list(DLR_HAND2.joint_names), coupled, object=held)
         session = self._session(description, urdf, rng)
         rig, joints = session.free.recording.rig, DLR_HAND2.joint_names
         free = [kind for kind in self.kinds if kind in EXCITATIONS]
@@ -77,12 +80,6 @@ class SimulatedGrasp(SimulatedSession):
         session.loaded.close()
         session.free.close()
         return result
-
-    def _description(self) -> Description:
-        gravity = DLR_HAND2.rotation.T @ [0.0, 0.0, -9.81]
-        coupled = {f"{finger.name}_q4": Coupling(joint=f"{finger.name}_q3") for finger in DLR_HAND2.fingers}
-        held = {"size": self.size, "mass": next(iter(self.weights))}
-        return self.described(gravity.tolist(), list(DLR_HAND2.joint_names), coupled, object=held)
 
     def _session(self, description: Description, urdf: str, rng: np.random.Generator) -> _Session:
         joints = tuple(description.joints)

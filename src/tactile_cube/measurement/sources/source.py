@@ -34,17 +34,13 @@ def described(**values: object) -> Description:
     return Description.model_validate({"format": 1, "trials": PLACEHOLDER} | values)
 
 
-def known(values: Mapping[str, Value | None]) -> dict[str, Value]:
-    """The entries that are not None."""
-    return {key: value for key, value in values.items() if value is not None}
-
-
 def with_stated(
     said: Mapping[str, Value | None], stated: Mapping[str, Mapping[str, float]], joints: Sequence[str]
 ) -> dict[str, Any]:
     """What the user says, and what the rig's file states of all joints; a limit that is infinite says nothing."""
     of_file = {key: {joint: row[joint] for joint in joints} for key, row in stated.items() if row.keys() >= set(joints)}
-    return of_file | {key: value for key, value in known(said).items() if value != float("inf") or key not in of_file}
+    given = {key: value for key, value in said.items() if value is not None}
+    return of_file | {key: value for key, value in given.items() if value != float("inf") or key not in of_file}
 
 
 def listed(files: str | Iterable[str]) -> list[str]:
