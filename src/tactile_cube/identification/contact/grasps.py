@@ -2,7 +2,7 @@
 
 Where a fingertip first touches decides how hard it presses later, and joint offsets of a degree move it by millimetres.
 So every value of a contact effect is judged with the offsets and the place of the object that suit it best, found anew
-from those of the paper's contact: what suits another value would pull the answer to where the search began.
+from zero: what suits another value would pull the answer to where the search began.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ SCALE = 3 * LEFT  # beside which an error counts, as a rig's error does beside i
 WIDTHS = (4e-3, 4e-4)  # [rad], [m] finite steps, wide against the roughness of contact
 EVERY = 3  # rows of a trial that are compared; neighbours say the same
 ALIKE = 10  # of these rows count as one: what the world leaves stays the same for some 0.3 s
-ITERATIONS = 6  # steps with slopes that each step corrects
+ITERATIONS = 4  # steps with slopes that each step corrects
 SHARES = (1.0, 0.3)  # of a step that are tried
 ENOUGH = 0.05  # share of the misfit that a further step must take off
 MOVED = 1e-3  # [rad] a finger whose commands move less takes no part, so that nobody need know its offsets
@@ -71,7 +71,6 @@ class Grasp:
         released = round(trial.load.released / trial.step)
         self._grip = released if released >= EVERY else len(trial.time)
         self._slopes: Array | None = None
-        self._begin: Array | None = None
         self._known: dict[frozenset[tuple[str, str, float]], tuple[Array, Array]] = {}
 
     def fitted(self, contact: ContactModel) -> tuple[Array, Array]:
@@ -88,18 +87,23 @@ class Grasp:
         return self._known[key]
 
     def _fitted_grip(self, contact: ContactModel) -> Array:
-        """From what suits the paper's contact, on the time before the box has weight, when nothing can slip yet."""
-        if self._begin is None:
-            self._begin = np.zeros(len(self.spread))
-            self._begin = self._fitted_grip(ContactModel({}))
-        unknown, target = self._begin, self._target(contact, self._begin)
+        """From zero, on the time before the box has weight, when nothing can slip yet."""
+        unknown = np.zeros(len(self.spread))
+        target = self._target(contact, unknown)
         if self._slopes is None:
-            steps = np.diag(self._width)[self.free]
-            columns = [(self._target(contact, unknown + step) - target) / step.max() for step in steps]
-            self._slopes = np.stack(columns, axis=1)
-        return self._descended(contact, unknown, target, self._slopes)
+            self._slopes = self._gradients(contact, unknown, target)
+        unknown, target = self._descended(contact, unknown, target, self._slopes)
+        if target @ target > len(target):  # slopes of another contact led nowhere
+            slopes = self._gradients(contact, unknown, target)
+            unknown, target = self._descended(contact, unknown, target, slopes)
+        return unknown
 
-    def _descended(self, contact: ContactModel, unknown: Array, target: Array, slopes: Array) -> Array:
+    def _gradients(self, contact: ContactModel, unknown: Array, target: Array) -> Array:
+        steps = np.diag(self._width)[self.free]
+        columns = [(self._target(contact, unknown + step) - target) / step.max() for step in steps]
+        return np.stack(columns, axis=1)
+
+    def _descended(self, contact: ContactModel, unknown: Array, target: Array, slopes: Array) -> tuple[Array, Array]:
         """Gauss-Newton steps; what each of them saw corrects the slopes.
 
         Source: C. G. Broyden, A class of methods for solving nonlinear simultaneous equations, 1965.
@@ -119,7 +123,7 @@ class Grasp:
                     break
             if target @ target > (1 - ENOUGH) * before:
                 break
-        return unknown
+        return unknown, target
 
     def _target(self, contact: ContactModel, unknown: Array) -> Array:
         grip = self._simulate(contact, unknown, self._grip) - self.trial.position[: self._grip]
