@@ -39,7 +39,7 @@ from tactile_cube.identification.search.search import Search
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model, Term
 
-MOST = 4  # effects in a set
+MOST = 4  # laws in a set, each at all joints that need it
 JUDGED = 6  # sets that the held-out trials judge, and as many more of what may stand for one of the chosen effects
 
 
@@ -111,13 +111,13 @@ def proposed(search: Search) -> tuple[list[Proposal], Looks | None]:
     parent = Proposal((), search.base.fit)
     found: list[Proposal] = []
     first: Looks | None = None
-    while (places := off(search, parent.fit)) and len(parent.effects) < MOST and not search.spent:
+    while (places := off(search, parent.fit)) and laws_of(parent) < MOST and not search.spent:
         looks = look(search, parent, [search.fitted.joints[j] for j in places])
         first = first or looks
         if not looks.tried:
             break
         search.say(f"{len(looks.scores)} starts of {len(looks.tried)} laws beside {parent.label}")
-        tried = [one for one in grown(search, looks) if len(one.effects) <= MOST]
+        tried = [one for one in grown(search, looks) if laws_of(one) <= MOST]
         tried += [richer for richer in (detailed(search, one) for one in tried[:1]) if richer]
         tried.sort(key=lambda one: one.price(search.criteria))
         found += tried
@@ -126,6 +126,11 @@ def proposed(search: Search) -> tuple[list[Proposal], Looks | None]:
         parent = tried[0]
         search.say.following = "one effect more, and each one taken out"
     return [*found, *reduced(search, parent)], first
+
+
+def laws_of(one: Proposal) -> int:
+    """How many laws a set has, wherever they act."""
+    return len({effect.effect.name for effect in one.effects})
 
 
 def reduced(search: Search, one: Proposal) -> list[Proposal]:
