@@ -13,24 +13,26 @@ SEGMENTS, ROWS = 30, 40
 UNKNOWNS = tuple(Unknown("constant", key, 0, -np.inf, np.inf, 1.0) for key in ("kd", "kp"))
 
 
-@pytest.mark.parametrize("remembered", [0.0, 3.0])
+@pytest.mark.parametrize(("remembered", "alike"), [(0.0, 1), (3.0, 1), (3.0, 3)])
 def test_errors_follow_the_scatter_of_segments_and_are_no_smaller_than_noise_as_large_as_the_residual_allows(
-    remembered: float,
+    remembered: float, alike: int
 ) -> None:
     rng = np.random.default_rng(0)
+    groups = np.arange(SEGMENTS) // alike
     columns = rng.normal(size=(SEGMENTS, ROWS, 2)) + 1.0
-    noise = 0.5 * rng.normal(size=(SEGMENTS, ROWS)) + remembered * rng.normal(size=(SEGMENTS, 1))
+    noise = 0.5 * rng.normal(size=(SEGMENTS, ROWS)) + remembered * rng.normal(size=(SEGMENTS, 1))[groups]
     flat = columns.reshape(-1, 2)
     ols = OLS(noise.ravel(), flat).fit()
-    clusters = {"groups": np.repeat(np.arange(SEGMENTS), ROWS), "use_correction": False}
-    robust = ols.get_robustcov_results("cluster", **clusters).bse * np.sqrt(SEGMENTS / (SEGMENTS - 2))
+    clusters = {"groups": np.repeat(groups, ROWS), "use_correction": False}
+    count = SEGMENTS // alike
+    robust = ols.get_robustcov_results("cluster", **clusters).bse * np.sqrt(count / (count - 2))
     information = flat.T @ flat
     left = ols.resid.reshape(SEGMENTS, ROWS)
     fitted = SimpleNamespace(
         residual=left, columns=columns, information=information, unknowns=UNKNOWNS, cost=np.sum(left**2)
     )
     problem = SimpleNamespace(free=np.asarray, weight=np.ones_like(left))
-    found = standard_errors(problem, fitted)  # type: ignore[arg-type]
+    found = standard_errors(problem, fitted, list(groups) if alike > 1 else None)  # type: ignore[arg-type]
     white = np.sqrt(max(np.mean(left**2), 1.0) * np.diag(np.linalg.inv(information)))
     assert (robust > white).all() == (remembered > 0.0)
     np.testing.assert_allclose(found, np.maximum(robust, white), rtol=1e-6)

@@ -161,7 +161,7 @@ class Grasps(Problem):
         self._counts[:, : self.joints] /= ALIKE
         numbers = [one.trial.initialisation for one in grasps]
         self._counts[:, self.joints :] /= np.array([[alike[one]] for one in numbers])
-        self._first = [numbers.index(one) for one in numbers]
+        self.alike = [numbers.index(one) for one in numbers]
         self._trust: Array = np.ones(len(grasps))
 
     def prediction(self, model: Model) -> Array:
@@ -205,7 +205,7 @@ class Grasps(Problem):
         samples, squares = self._counts.copy(), self._sums(residual**2)
         for one in (samples, squares):
             needed = np.zeros_like(one[:, joints:])
-            np.add.at(needed, self._first, one[:, joints:])
+            np.add.at(needed, self.alike, one[:, joints:])
             one[:, joints:] = needed
         costs = samples + squares
         costs[:, joints:] /= 2.0

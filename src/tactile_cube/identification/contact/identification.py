@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 from tactile_cube.drivetrain.effects.scales import FINGER
 from tactile_cube.drivetrain.model_file import EffectEstimate, ModelErrors, ModelFile
@@ -24,7 +25,7 @@ from tactile_cube.identification.contact.grasps import (
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.diagnosis_json import effect_entries, names_of, ranking
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit, precision
-from tactile_cube.identification.fitting.intervals import NORMAL_95, Fitted, bounds, standard_errors
+from tactile_cube.identification.fitting.intervals import Fitted, bounds, standard_errors
 from tactile_cube.identification.model_files import effect_estimate
 from tactile_cube.identification.search.candidates import Candidate, model_unknowns, without_effect
 from tactile_cube.identification.search.evidence import gain, p_value, worse
@@ -75,7 +76,8 @@ def final(grasps: OpenGrasps, model: Model) -> Fitted:
     moved = few.limited(grasps.finer(few).prediction(fitted.model) - base) * few.weight
     pull, information = columns.reshape(-1, len(scales)).T @ moved.ravel(), np.einsum("grp,grq->pq", columns, columns)
     shift = -scales * np.linalg.solve(information + np.diag(precision(fitted.unknowns)), pull)
-    return Fitted(fitted.model, fitted, NORMAL_95 * scales * standard_errors(problem, fitted), shift)
+    student = stats.t.ppf(0.975, max(len(set(problem.alike)) - 1, 1))  # each initialisation has errors of its own
+    return Fitted(fitted.model, fitted, student * scales * standard_errors(problem, fitted, problem.alike), shift)
 
 
 @dataclass(frozen=True)

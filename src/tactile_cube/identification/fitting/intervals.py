@@ -49,8 +49,8 @@ def final_fit(problem: Problem, model: Model, unknowns: Sequence[Unknown], itera
     return Fitted(fitted.model, fitted, half_width, step_shift(problem, fitted))
 
 
-def standard_errors(problem: Problem, fitted: Fit) -> Array:
-    """Standard errors (P,) of the unknowns, in units of their scales.
+def standard_errors(problem: Problem, fitted: Fit, groups: Sequence[int] | None = None) -> Array:
+    """Standard errors (P,) of the unknowns, in units of their scales; `groups` of segments that err alike, if any do.
 
     The residual of a model that is not perfect remembers itself; so the scatter of the score is taken segment by
     segment (cluster-robust), and never less than white noise as large as the residual would give: of few long segments
@@ -58,6 +58,8 @@ def standard_errors(problem: Problem, fitted: Fit) -> Array:
     """
     freed = problem.free(fitted.residual)
     scores = np.einsum("grp,gr->gp", fitted.columns, freed, optimize=True)
+    if groups is not None:
+        scores = np.stack([scores[np.equal(groups, one)].sum(axis=0) for one in sorted(set(groups))])
     sizes, directions = np.linalg.eigh(fitted.information + np.diag(precision(fitted.unknowns)))
     sure = np.maximum(sizes, np.finfo(float).eps * sizes.max())  # what the data say nothing of may round to below zero
     inverse = (directions / sure) @ directions.T
