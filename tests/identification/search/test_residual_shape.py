@@ -1,7 +1,14 @@
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from tactile_cube.identification.search.residual_shape import Missing, black_box, shapes
+from tactile_cube.drivetrain.effects import find_effect
+from tactile_cube.identification.search.residual_shape import Missing, black_box, missing_torques, shapes
+from tactile_cube.identification.search.search import Search
+from tactile_cube.measurement.split import held_out_split
+from tests.identification.rigs_of_any_size import NOISE, Size, simulated
 
 RNG = np.random.default_rng(2)
 POSITION, SPEED = RNG.uniform(-1, 1, 8000), RNG.normal(size=8000)
@@ -39,3 +46,15 @@ def test_a_black_box_finds_a_law_of_two_signals() -> None:
 
 def test_a_black_box_finds_nothing_in_noise() -> None:
     assert black_box(missing(RNG.normal(size=8000))) == pytest.approx(0.0, abs=0.05)
+
+
+def test_rows_that_do_not_count_put_no_torque_beside_them(tmp_path: Path) -> None:
+    recording = simulated(tmp_path, Size(), find_effect("coulomb_friction"), {"friction": 0.16})
+    trials = [replace(trial, valid=trial.valid & (trial.time >= 0.4)) for trial in recording.trials]
+    largest = []
+    for one in (recording, replace(recording, trials=tuple(trials))):
+        search = Search(*held_out_split(one), np.full(1, NOISE), (), lambda line: None)
+        model, problem = search.start, search.problem
+        (missing,) = missing_torques(problem, search.fitted, model, problem.residual(problem.prediction(model)))
+        largest.append(np.abs(missing.torque).max())
+    assert largest[1] < 1.1 * largest[0]

@@ -67,7 +67,8 @@ def missing_torques(
     weight, measured, left = (
         one.reshape(len(residual), segment, -1)[..., :n] for one in (problem.weight, problem.measured, residual)
     )
-    error = np.divide(left, weight, out=np.zeros_like(weight), where=weight > 0)
+    # derivatives beside rows that do not count are unknown
+    error = np.divide(left, weight, out=np.full_like(weight, np.nan), where=weight > 0)
     step = recording.step
     position, velocity, acceleration = _derivatives(measured, step, problem.shooting.time)
     constants = model.constants
@@ -81,7 +82,7 @@ def missing_torques(
     begin = first + np.tile(np.arange(problem.windows.segments), len(problem.windows)) * length
     edge = min(round((time or 0.0) / step), segment // 4)
     inner = slice(max(segment // 8, edge), min(-segment // 8, -edge))
-    inside = np.all(weight[:, inner] > 0, axis=2)
+    inside = np.isfinite(ddr[:, inner]).all(axis=2)
     number = np.broadcast_to(np.arange(len(weight))[:, None], weight.shape[:2])[:, inner][inside]
     clock = (begin[:, None] + np.arange(segment) * step)[:, inner][inside]
     angle = position + np.array([model.offsets[int(k)] for k in problem.segment_initialisation])[:, None]
