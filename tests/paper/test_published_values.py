@@ -67,8 +67,8 @@ PUBLISHED: dict[str, list[Row]] = {
         # learning
         ("curriculum.filter_time", 0.12, "W [s]"),
         ("curriculum.gravity_scale", 0.05, "W"),
-        ("curriculum.begin", 2e6, "W [steps]"),
-        ("curriculum.length", 4e6, "W [steps]"),
+        ("curriculum.low", 2e6, "W [steps]"),
+        ("curriculum.high", 6e6, "W [steps]"),
         ("agent._target_", "tactile_cube.agent.sac.Sac", "P"),
         ("agent.hidden", [512, 512], "P"),
         ("agent.gamma", 0.9, "W"),
