@@ -356,7 +356,7 @@ def writes(file: Path) -> list[str]:
 def _own(node: ast.Call) -> bool:
     """Whether it is a method of this package's, which writes in a module of its own, or makes bytes in memory."""
     owner = ast.unparse(node.func.value) if isinstance(node.func, ast.Attribute) else "save"
-    return owner.endswith((".desk", ".bench", ".checkpoints", "record", "save")) or owner.startswith("grasps_of")
+    return owner.endswith((".desk", "bench", ".checkpoints", "record", "save")) or owner.startswith("grasps_of")
 
 
 def test_no_module_writes_a_result_but_by_write_whole(tmp_path: Path) -> None:
