@@ -54,7 +54,8 @@ def _one_line(error: BaseException) -> str:
 
     cause = error.__cause__ or error.__context__
     if key := re.match(r"Could not override '([^']+)'.\s*To append to your config", str(error)):
-        return f"{key[1]}: no such setting{near_key(key[1]) or '; --help lists them'}"
+        asked = max(key[1], str(getattr(cause, "full_key", "")), key=len)
+        return f"{asked}: no such setting{near_key(asked) or '; --help lists them'}"
     if isinstance(error, MissingMandatoryValue):
         return f"{error.full_key}=... is missing{meaning(str(error.full_key))}"
     if isinstance(error, ValidationError):

@@ -56,7 +56,7 @@ def test_a_csv_import_that_failed_does_not_block_the_corrected_command(tmp_path:
     assert "source.time_unit=ms" in wrong.stderr
     right = run("record", *words, folder=tmp_path)
     assert right.returncode == 0, right.stderr
-    assert "time        time [ms], 100 Hz" in right.stdout
+    assert "time time [ms], 100 Hz" in " ".join(right.stdout.split())
     assert "rec: 2 trials (sines), 6 s, joints a, b" in right.stdout
     assert {path.name for path in tmp_path.iterdir()} >= {"rec", "outputs"}
     assert not list(tmp_path.glob(".rec*"))
@@ -106,7 +106,7 @@ def test_from_a_lerobot_data_set_to_a_named_effect_by_one_command(tmp_path: Path
     (effect,) = read_model(tmp_path / "run" / "model.yaml").effects
     assert effect.effect == "command_delay@shoulder_pan"
     assert effect.parameters["delay"].value == pytest.approx(DELAY, abs=0.002)
-    assert read_model(tmp_path / "run" / "model.yaml").provenance.recording == "run/recording"
+    assert read_model(tmp_path / "run" / "model.yaml").provenance.recording.endswith("run/recording")
 
 
 def test_what_is_known_already_is_no_news_to_diagnose(tmp_path: Path) -> None:

@@ -39,7 +39,7 @@ def test_a_rig_of_any_size_is_diagnosed_alike(name: str, tmp_path: Path) -> None
     assert verdict.chosen.error == pytest.approx(1.0, abs=0.1)
     (term,) = verdict.chosen.fit.model.terms
     # positions read a little earlier or later within their rows damp as well
-    assert term.values["damping"] / SIZES[name].damping == pytest.approx(0.08, rel=0.15)
+    assert term.values["damping"] / SIZES[name].damping == pytest.approx(0.08, rel=0.2)
 
 
 @pytest.mark.parametrize("name", ["a finger's finger", "an excavator"])

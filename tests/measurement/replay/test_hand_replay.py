@@ -59,7 +59,7 @@ def test_the_truth_leaves_little_and_other_friction_much_more(replay: HandReplay
     true = error(replay, recording, TRUTH)
     assert true < 1e-3
     assert error(replay, recording, ContactModel({})) > 4 * true
-    assert error(replay, recording, TRUTH.changed("object_mass", excess=-0.1)) > 2 * true
+    assert error(replay, recording, ContactModel({**TRUTH.values, "object_mass": {"excess": -0.1}})) > 2 * true
 
 
 def test_the_load_slips_later_with_more_friction(replay: HandReplay, recording: Recording) -> None:
