@@ -256,6 +256,7 @@ def test_two_joints_of_different_gains_are_compared(window: Any, served: tuple[s
     window.get_by_label("angle in").select_option("deg")
     window.get_by_role("button", name="Import").click()
     window.get_by_role("cell", name="refitted", exact=True).wait_for()
+    window.get_by_label("joint", exact=True).select_option("b")  # the page keeps the joint that was looked at before
     window.get_by_text("b in this trial").wait_for()
     newest = max(served[1].glob("recording_*/recording.yaml"), key=lambda path: path.stat().st_mtime)
     described = yaml.safe_load(newest.read_text())

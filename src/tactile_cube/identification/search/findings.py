@@ -111,7 +111,10 @@ def proposed(search: Search) -> tuple[list[Proposal], Looks | None]:
     parent = Proposal((), search.base.fit)
     found: list[Proposal] = []
     first: Looks | None = None
-    while (places := off(search, parent.fit)) and laws_of(parent) < MOST and not search.spent:
+    for _ in range(MOST):
+        places = off(search, parent.fit)
+        if not places or laws_of(parent) >= MOST or search.spent:
+            break
         looks = look(search, parent, [search.fitted.joints[j] for j in places])
         first = first or looks
         if not looks.tried:
@@ -134,10 +137,17 @@ def laws_of(one: Proposal) -> int:
 
 
 def reduced(search: Search, one: Proposal) -> list[Proposal]:
-    """Sets that are left when one effect after another is taken out, the one that is missed least."""
+    """Sets that are left when one effect after another is taken out, the one that is missed least.
+
+    More effects than `MOST` are few laws at many joints: a law is then taken out at all of them.
+    """
     found: list[Proposal] = []
-    while len(one.effects) > 1 and not search.spent:
-        less = [without(search, one, place) for place in range(len(one.effects))]
+    while (laws_of(one) > 1 or 1 < len(one.effects) <= MOST) and not search.spent:
+        groups = [[place] for place in range(len(one.effects))]
+        if len(groups) > MOST:
+            names = [effect.effect.name for effect in one.effects]
+            groups = [[place for place, name in enumerate(names) if name == law] for law in dict.fromkeys(names)]
+        less = [without(search, one, *places) for places in groups]
         found += less
         one = min(less, key=lambda e: e.fit.cost)
     return found

@@ -226,7 +226,9 @@ def press(gradient: Array, gram: Array, expected: float) -> float:
     return float(np.sum(2.0 * factors * gradient) - np.einsum("tc,tcd,td->", factors, gram, factors))
 
 
-def without(search: Search, one: Proposal, place: int) -> Proposal:
-    """The set without one of its effects, refitted."""
-    model = without_effect(one.fit.model, one.effects, place)
-    return Proposal((*one.effects[:place], *one.effects[place + 1 :]), search.refitted(model))
+def without(search: Search, one: Proposal, *places: int) -> Proposal:
+    """The set without some of its effects, refitted."""
+    model, effects = one.fit.model, one.effects
+    for place in sorted(places, reverse=True):
+        model, effects = without_effect(model, effects, place), (*effects[:place], *effects[place + 1 :])
+    return Proposal(effects, search.refitted(model))
