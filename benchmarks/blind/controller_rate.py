@@ -17,7 +17,7 @@ import yaml
 from tactile_cube.measurement.comparing.error import free_run_error
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.writing import write_recording
-from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.model import nominal_model
 from tactile_cube.measurement.replay.simulator import free_run
 from tactile_cube.measurement.sources.simulated_rig import SimulatedRig
 from tactile_cube.measurement.units import milli

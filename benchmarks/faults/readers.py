@@ -24,8 +24,7 @@ from tactile_cube.deployment.controller import read_network
 from tactile_cube.deployment.export import interface_contract
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile, read_model, write_model
 from tactile_cube.env import Task
-from tactile_cube.evaluation.environment import environment
-from tactile_cube.evaluation.policies import HoldPolicy, PolicySource
+from tactile_cube.evaluation.policies import HoldPolicy, PolicySource, environment
 from tactile_cube.hand.dlr_hand2 import DLR_HAND2
 from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.measurement.recordings.reading import read_recording

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.env.cube_pose import CubePose
+from tactile_cube.env.task import CubePose
 from tactile_cube.errors import InputError
 
 TOUCH_FORCE = 0.02

@@ -8,9 +8,21 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.env.cube_pose import CubePose, cube_pose, frame_along, seen_along
 from tactile_cube.env.reward import Reward, Step
-from tactile_cube.env.task import DROPPED, FAULTY, LEFT_RANGE, LIFTED, RUNNING, TILTED, TIME_LIMIT, Task
+from tactile_cube.env.task import (
+    DROPPED,
+    FAULTY,
+    LEFT_RANGE,
+    LIFTED,
+    RUNNING,
+    TILTED,
+    TIME_LIMIT,
+    CubePose,
+    Task,
+    cube_pose,
+    frame_along,
+    seen_along,
+)
 from tactile_cube.hand import DLR_HAND2, Hand, tip_positions
 from tactile_cube.randomization import GraspTable, Randomization, StartPoses, drawn_places
 from tactile_cube.simulation import EpisodeConstants, World

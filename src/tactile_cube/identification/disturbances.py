@@ -17,13 +17,11 @@ from tactile_cube.identification.search.evidence import judge, segment_errors
 from tactile_cube.identification.search.explanation import Proposal
 from tactile_cube.identification.search.proposals import look
 from tactile_cube.identification.search.search import Search
-from tactile_cube.measurement.comparing.noise_floor import noise_with_links
-from tactile_cube.measurement.comparing.repeats import repeats_of
+from tactile_cube.measurement.comparing.noise_floor import noise_with_links, repeats_of
 from tactile_cube.measurement.recordings.description import MOST_LATE
 from tactile_cube.measurement.recordings.reading import DESCRIPTION
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.model import Model
-from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.model import Model, nominal_model
 
 Array = NDArray[np.float64]
 STANDS_OUT = (

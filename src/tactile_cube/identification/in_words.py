@@ -8,7 +8,7 @@ from typing import Any
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.next_experiment import FILE, Experiment
 from tactile_cube.identification.safe_commands import QUANTITIES, SCALES, TRIALS
-from tactile_cube.measurement.comparing.repeats import Drift
+from tactile_cube.measurement.comparing.noise_floor import Drift
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.units import TURNS, common_unit, milli, of_joint, short
 

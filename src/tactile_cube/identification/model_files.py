@@ -11,10 +11,9 @@ import numpy as np
 from scipy import stats
 
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelErrors, ModelFile, Provenance
-from tactile_cube.identification.fitting.intervals import NORMAL_95, Fitted, bounds
+from tactile_cube.identification.fitting.resolution import NORMAL_95, Fitted, bounds
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.model import Term
-from tactile_cube.measurement.replay.nominal import CONTROLLER, nominal_model
+from tactile_cube.measurement.replay.model import CONTROLLER, Term, nominal_model
 
 UNITS = {
     "kp": "N m/rad",

@@ -15,12 +15,11 @@ import polars as pl
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
-from tactile_cube.drivetrain.effects.scales import Scales
+from tactile_cube.drivetrain.effects.effect import Scales
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.gauss_newton import Fit, precision
-from tactile_cube.identification.fitting.problem import Problem
+from tactile_cube.identification.fitting.problem import Problem, Shooting
 from tactile_cube.identification.fitting.resolution import FINER, finer
-from tactile_cube.identification.fitting.shooting import Shooting
 from tactile_cube.identification.fitting.unknowns import Unknown, offset_unknowns
 from tactile_cube.identification.safe_commands import PossibleMotions, Safety, covariance_of_numbers
 from tactile_cube.measurement.recordings.recording import Recording

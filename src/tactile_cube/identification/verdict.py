@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from tactile_cube.identification.criteria import STANDARD, Criteria
-from tactile_cube.identification.fitting.intervals import Fitted, final_fit
 from tactile_cube.identification.fitting.problem import Problem
+from tactile_cube.identification.fitting.resolution import Fitted, final_fit
 from tactile_cube.identification.search.evidence import worse
 from tactile_cube.identification.search.explanation import Explanation, contains, named, proven, simplest
 from tactile_cube.identification.search.findings import Findings

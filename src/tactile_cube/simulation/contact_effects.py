@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from tactile_cube.drivetrain.effects import Effect, Parameter, Stage, find_effect
-from tactile_cube.drivetrain.effects.scales import Scales
+from tactile_cube.drivetrain.effects.effect import Scales
 from tactile_cube.errors import InputError
 from tactile_cube.simulation.constants import EpisodeConstants
 

@@ -26,8 +26,7 @@ from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, sensor_no
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
 from tactile_cube.measurement.replay.hand_replay import ContactModel, HandReplay, contact_of
-from tactile_cube.measurement.replay.model import Model, Term
-from tactile_cube.measurement.replay.nominal import nominal_model, require_same_joints
+from tactile_cube.measurement.replay.model import Model, Term, nominal_model, require_same_joints
 from tactile_cube.measurement.replay.simulator import Simulated
 from tactile_cube.measurement.split import held_out_split
 from tactile_cube.simulation.contact_effects import ContactEffect, contact_catalogue

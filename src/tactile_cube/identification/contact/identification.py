@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from tactile_cube.drivetrain.effects.scales import FINGER
+from tactile_cube.drivetrain.effects.effect import FINGER
 from tactile_cube.drivetrain.model_file import EffectEstimate, ModelErrors, ModelFile
 from tactile_cube.errors import InputError
 from tactile_cube.identification.contact.grasps import (
@@ -25,7 +25,7 @@ from tactile_cube.identification.contact.grasps import (
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.diagnosis_json import effect_entries, names_of, ranking
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit, precision
-from tactile_cube.identification.fitting.intervals import Fitted, bounds, standard_errors
+from tactile_cube.identification.fitting.resolution import Fitted, bounds, standard_errors
 from tactile_cube.identification.model_files import effect_estimate
 from tactile_cube.identification.search.candidates import Candidate, model_unknowns, without_effect
 from tactile_cube.identification.search.evidence import gain, p_value, worse

@@ -18,7 +18,7 @@ from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.hand.urdf_tree import robot_of
 from tactile_cube.identification.export.joint_drive import JointDrive, drives_of
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.model import nominal_model
 from tactile_cube.measurement.replay.simulator import Simulator
 
 Array = NDArray[np.float64]
