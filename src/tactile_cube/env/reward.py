@@ -4,8 +4,6 @@ A term is a function with `@term` and a line in `conf/reward/`, its weight. The 
 to the reward, so that a replay can weigh them anew when the weights follow a schedule.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

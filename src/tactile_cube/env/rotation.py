@@ -1,7 +1,5 @@
 """The rotation task in one world, at 10 Hz, in plain numpy: every learner's environment is made of this one."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The task: pose of the cube, where it may go, how heavy it is, how long an episode lasts."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Sequence

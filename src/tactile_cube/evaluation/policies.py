@@ -1,7 +1,5 @@
 """What decides in an episode, a trained actor or a baseline, and the environment that it is tried in."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path

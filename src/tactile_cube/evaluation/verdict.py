@@ -1,7 +1,5 @@
 """One row for each episode: a word for what it was, the numbers it rests on, and what is physically wrong with it."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 

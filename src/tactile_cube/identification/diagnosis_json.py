@@ -1,7 +1,5 @@
 """diagnosis.json: the diagnosis as plain numbers, for scripts."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any

@@ -1,7 +1,5 @@
 """What makes no law of a recording: stretches that follow no model, and commands that were logged late."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 

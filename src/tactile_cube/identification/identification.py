@@ -1,7 +1,5 @@
 """Fitting exactly the effects that a user names, one after another, and the error after each step."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """The diagnosis and the next experiment in plain words."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What was identified, as a model file, and what has changed between two of them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime

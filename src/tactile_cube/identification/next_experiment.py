@@ -4,8 +4,6 @@ Telling is what a rival still gets wrong after it was refitted to what the other
 design of experiments for discriminating between two rival models, Biometrika 62, 1975).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """From everything that was tried to an answer: one of five verdicts, and the simulations that it asks for."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace

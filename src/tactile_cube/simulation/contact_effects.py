@@ -1,7 +1,5 @@
 """Contact effects: properties of fingertips and object that are constants of an episode, one class each."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 from typing import Any, ClassVar

@@ -15,12 +15,12 @@ from tactile_cube.simulation.engine import (
     OBJECT_STATE,
     SKIN_RELAXATION,
     Contact,
+    HandDrive,
     SimulationOptions,
     Surface,
     named_contact,
     surfaces,
 )
-from tactile_cube.simulation.world import HandDrive
 
 TABLE_HALF_SIZE = (0.25, 0.25, 0.02)  # [m]
 SOLVER_TOLERANCE = 1e-10

@@ -1,7 +1,5 @@
 """Charts of the reports, and figures of a comparison: Matplotlib draws them as SVG text that needs nothing else."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

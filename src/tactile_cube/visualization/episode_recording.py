@@ -1,7 +1,5 @@
 """An episode for Rerun, and as a small film on which a person can check the regrasps."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Mapping, Sequence
 from contextlib import closing

@@ -5,8 +5,6 @@ So every value of a contact effect is judged with the offsets and the place of t
 from zero: what suits another value would pull the answer to where the search began.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager

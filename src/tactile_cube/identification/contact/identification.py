@@ -1,7 +1,5 @@
 """Effects of fingertips and object: those that a user names fitted, and those that a model lacks searched for."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

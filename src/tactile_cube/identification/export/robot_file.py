@@ -1,7 +1,5 @@
 """A rig and its model as MJCF, with position or motor actuators, or as URDF: limits, friction and damping of joints."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from html import escape
 from math import ceil, isfinite

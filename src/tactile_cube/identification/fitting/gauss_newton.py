@@ -1,7 +1,5 @@
 """Bounded Levenberg-Marquardt on the marginal likelihood of a multiple-shooting problem."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 

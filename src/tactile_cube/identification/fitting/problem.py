@@ -1,7 +1,5 @@
 """Multiple shooting: windows that start from what was measured, and their least-squares problem."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

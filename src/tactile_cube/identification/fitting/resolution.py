@@ -1,7 +1,5 @@
 """Time steps that the sensors cannot tell from finer ones, and the final fit with 95 % intervals."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -19,6 +17,7 @@ from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model, nominal_model
 from tactile_cube.measurement.replay.windows import Windows, steps_per_row
 
+Array = NDArray[np.float64]
 FINER = 8  # times as short are the steps that show what the model's own ones do: 0.25 ms beside 2 ms
 ENOUGH = 12  # windows that tell it, spread over the recording: up to 53 s of a finger
 
@@ -63,7 +62,6 @@ def finer(windows: Windows, times: int) -> Windows:
     return replace(windows, commands=commands.reshape(count, -1, joints), substeps=fine)
 
 
-Array = NDArray[np.float64]
 FINEST = 8  # times as short steps at most where no rate is stated: so much longer does a diagnosis take
 HIDDEN = 0.2  # of the sensor noise: its square is `criteria.least_gain`, so that mending it is no reason for an effect
 StepError = Callable[[Recording, int], float]

@@ -1,7 +1,5 @@
 """The numbers of a model that are fitted."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

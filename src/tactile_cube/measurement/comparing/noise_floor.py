@@ -1,7 +1,5 @@
 """Error that no model can undercut: the scatter of repeats, or the sensor noise; drift between repeats."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple

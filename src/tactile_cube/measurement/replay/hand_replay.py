@@ -1,7 +1,5 @@
 """Trials in which the whole hand holds an object, simulated in the world that training uses."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
