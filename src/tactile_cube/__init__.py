@@ -79,7 +79,7 @@ class _Package(ModuleType):
 
 
 class _Commands(MetaPathFinder, InspectLoader):
-    """Gives each command of conf/ a module, for `python -m tactile_cube.train`."""
+    """Give each command of conf/ a module, for `python -m tactile_cube.train`."""
 
     def find_spec(self, fullname: str, path: Any = None, target: ModuleType | None = None) -> ModuleSpec | None:
         package, _, name = fullname.rpartition(".")

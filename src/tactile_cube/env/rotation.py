@@ -100,7 +100,7 @@ class RotationEnv:
         constants: EpisodeConstants | None = None,
         hand: Hand = DLR_HAND2,
     ) -> None:
-        """Puts the task into `world`, whose hand is `hand`; `constants` are nominal, None: the published ones."""
+        """Create the task in `world`, whose hand is `hand`; `constants` are nominal, None: the published ones."""
         self.world, self.task, self.reward, self.randomization, self.hand = world, task, reward, randomization, hand
         self.nominal = EpisodeConstants() if constants is None else constants
         self.start_poses = start
@@ -116,11 +116,11 @@ class RotationEnv:
         self.seed(0)
 
     def seed(self, seed: int, index: int = 0) -> None:
-        """Starts the count of episodes anew; `index` tells worlds with the same seed apart."""
+        """Reset the episode counter; `index` separates worlds with the same seed."""
         self._seed, self._index, self._episode = seed, index, 0
 
     def reset(self) -> TimeStep:
-        """Starts the next episode."""
+        """Start the next episode."""
         rng = np.random.default_rng([self._seed, self._index, self._episode])
         self._episode += 1
         self.places = drawn_places(self.odds, rng)

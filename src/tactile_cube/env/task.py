@@ -130,7 +130,7 @@ class Task:
     axis: str | Sequence[float] = "z"
 
     def __post_init__(self) -> None:
-        """Refuses values without a meaning."""
+        """Refuse values without a meaning."""
         for key in ("filter_time", "plane_range", "height_range", "tilt_limit", "episode_steps", "symmetry"):
             value = getattr(self, key)
             if not (math.isfinite(value) and value > 0):

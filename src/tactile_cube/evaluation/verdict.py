@@ -82,7 +82,7 @@ class EpisodeResult:
         rise: mean height of the cube above its start in the last `LATE_SHARE` of the episode [m].
         drift: mean vertical velocity of the cube, below 0 where it sinks [m/s].
         tip_support: as `link_contact` and `link_force_share`: see `touch.support`.
-        reward_terms: sum of each weighed term of the reward.
+        reward_terms: sum of each weighted term of the reward.
         exploits: names of physical exploits found; empty when the turning is honest.
         world: constants of its world, SI units, as `EpisodeRecord.constants` has them.
     """

@@ -102,7 +102,7 @@ class Inquiry:
 
 
 class Inquired(NamedTuple):
-    """What was asked in the end, what counts in nothing of it, and what may be such a stretch too."""
+    """The final inquiry; the excluded and the suspected intervals."""
 
     inquiry: Inquiry
     left_out: tuple[Disturbance, ...] = ()
@@ -130,7 +130,7 @@ def beside_disturbances(inquiry: Inquiry) -> Inquired:
         for one in found:
             inquiry.say(
                 f"{one.trial} follows no model from {one.start:.2f} to {one.end:.2f} s ({one.joint}: {one.error:.0f} x "
-                "sensor noise); once more without"
+                "sensor noise): excluded; repeating the search"
             )
         without = replace(inquiry, recording=undisturbed(recording, found))
         if not proven and without.answer.says <= inquiry.answer.says:
@@ -158,13 +158,13 @@ class Diagnosis:
         floor: noise floor of the recording.
         unexplained: what is left, joint by joint; empty unless something is.
         standard: the field's standard model, which came first.
-        experiment: what would tell rivals, or what is unproven and chance, apart; None without either.
+        experiment: what would separate the rivals, or an unproven effect from chance; None without either.
         held_out: names of the trials that the search chose by.
         tested: names of those that nothing was fitted to or chosen by; without any, those that chose test too.
         known: effects of the model that it began with, NAME@JOINT.
         common: joint offsets that may be the encoder's or the initialisations'.
-        left_out: stretches that follow no model, and that count in nothing above.
-        suspected: stretches that may be such ones, and count.
+        left_out: excluded intervals, which follow no model.
+        suspected: intervals that may follow no model, not excluded.
         unseen: effects that no trial could show.
         criteria: what decided.
     """

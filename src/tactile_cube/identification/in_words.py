@@ -113,7 +113,7 @@ def left_over(result: Mapping[str, Any]) -> str:
     left = milli(error["with_effects"], common_unit(result.get("shown_in", result.get("units", {})).values()))
     windows = result.get("error_over_noise", {}).get("with_effects", floors)
     if windows < LEFT < floors:
-        return f" ({windows:.2f} sensor noises remain in short windows; run freely, the model parts by {left})"
+        return f" ({windows:.2f} sensor noises remain in short windows; in a free run it deviates by {left})"
     return f" ({left} remain, {short(floors, 2)} noise floors)" if floors > LEFT else ""
 
 

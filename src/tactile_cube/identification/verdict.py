@@ -57,7 +57,7 @@ def decide(findings: Findings, criteria: Criteria = STANDARD) -> Verdict:
 
 
 def closest(found: Sequence[Explanation], findings: Findings, criteria: Criteria) -> Explanation:
-    """The explanation that follows the held-out trials best: where none is claimed, a model is there to predict."""
+    """Return the explanation that predicts the held-out trials best."""
     unclear = [one for one in findings.judged if not proven(one, criteria) and not at_bound(one)]
     possible = [findings.base, *found, *unclear]
     return min(possible, key=lambda one: one.judgement.costs.sum())
@@ -120,7 +120,7 @@ class Unexplained:
 
 
 class Simulations:
-    """What a decision asks of an explanation beside its fit: simulated where it matters, each question once."""
+    """Cached checks of an explanation beside its fit: final fit and unexplained torque."""
 
     def __init__(self, search: Search, base: Explanation, floor: NoiseFloor) -> None:
         self.search, self.base, self.floor = search, base, floor

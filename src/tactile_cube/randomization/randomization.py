@@ -232,7 +232,7 @@ class Randomization:
     def constants(
         self, nominal: EpisodeConstants, rng: np.random.Generator, places: Mapping[str, float] | None = None
     ) -> EpisodeConstants:
-        """Draws the constants of one episode around `nominal`; `places`: where in [0, 1) of its range a value lies."""
+        """Draw the constants of one episode around `nominal`; `places`: where in [0, 1) of its range a value lies."""
         known = places or {}
         changed: dict[str, Any] = {}
         groups: Any = ((self.values, None), (self.factors, np.multiply), (self.shifts, np.add))

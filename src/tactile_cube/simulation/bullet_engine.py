@@ -192,7 +192,7 @@ class BulletEngine:
         return force
 
     def close(self) -> None:
-        """Ends the physics server."""
+        """End the physics server."""
         if pybullet.isConnected(self.client):
             pybullet.disconnect(self.client)
 

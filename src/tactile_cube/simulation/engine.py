@@ -172,10 +172,10 @@ class Engine(Protocol):
     v: Array
 
     def place(self, constants: EpisodeConstants, start: Start, q: Array, v: Array) -> None:
-        """Puts everything at the start of an episode, the joints at q, v; nothing of the past remains, to the bit."""
+        """Put everything at the start of an episode, the joints at q, v; nothing of the past remains, to the bit."""
 
     def set_gravity(self, acceleration: Array) -> None:
-        """Sets the world's gravity (3,) [m/s^2]."""
+        """Set the world's gravity (3,) [m/s^2]."""
 
     def run(self, steps: int, wrench: Array | None, record: bool) -> Array | None:
         """Runs physics steps: control, apply torques, step.
@@ -197,7 +197,7 @@ class Engine(Protocol):
         """Sums of the normal forces on the object of each finger's other links and of its tip (2, fingers) [N]."""
 
     def close(self) -> None:
-        """Ends the simulation."""
+        """End the simulation."""
 
 
 class HandDrive:

@@ -191,7 +191,7 @@ LEAST_IMPEDANCE, MOST_IMPEDANCE = 1e-4, 0.9999
 
 
 def set_contact(model: Any, pair: int, surface: Surface) -> None:
-    """Writes spring and damper of a pair into a compiled model."""
+    """Write spring and damper of a pair into a compiled model."""
     bodies = model.geom_bodyid[[model.pair_geom1[pair], model.pair_geom2[pair]]]
     weight = float(model.body_invweight0[bodies, 0].sum())
     dt, stiffness = float(model.opt.timestep), 1.0 / max(surface.compliance, HARD)

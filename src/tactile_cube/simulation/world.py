@@ -36,7 +36,7 @@ class World:
     def __init__(
         self, hand: Hand = DLR_HAND2, options: SimulationOptions | None = None, effects: Sequence[Effect] = ()
     ) -> None:
-        """Builds the bodies and the compiled control step, with further effects of the drivetrain, each at a joint.
+        """Build the bodies and the compiled control step, with further effects of the drivetrain, each at a joint.
 
         Raises:
             InputError: The options name no single engine.
@@ -55,7 +55,7 @@ class World:
     # --- running -------------------------------------------------------------------------------------------------
 
     def reset(self, constants: EpisodeConstants, start: Start) -> None:
-        """Starts an episode.
+        """Start an episode.
 
         Raises:
             InputError: Constants or start of another hand, or a torque loop that would be unstable with this time step.
@@ -91,7 +91,7 @@ class World:
         )
 
     def set_weight(self, scale: float) -> None:
-        """Gives the cube a share of its weight until changed or reset: the engine's gravity.
+        """Give the cube a share of its weight until changed or reset: the engine's gravity.
 
         The control step keeps the fingers' whole.
         """
@@ -113,7 +113,7 @@ class World:
         self._drive.view("external_torque")[self.hand.of_finger(finger)] = np.stack(columns, axis=1).T @ force
 
     def close(self) -> None:
-        """Ends the simulation."""
+        """End the simulation."""
         self._engine.close()
 
     # --- read-outs -----------------------------------------------------------------------------------------------

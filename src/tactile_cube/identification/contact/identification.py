@@ -45,7 +45,7 @@ STEPS, LAST_STEPS = 3, 2  # of Gauss-Newton, of a set in a search and of the las
 FINER = 2  # trials of each kind that tell what shorter steps of the world change
 SINGLES, MOST = 3, 3  # laws of each round that are refitted on more trials; effects of a set
 SURER: tuple[Kind, ...] = ("unknown_effect", "partly_explained", "ambiguous", "missing_effect", "adequate")
-"""Verdicts, the one that leaves most open first."""
+"""Verdicts, least certain first."""
 
 
 def stepped(problem: Grasps, parent: Model, effect: type[ContactEffect]) -> tuple[Candidate, Fit]:

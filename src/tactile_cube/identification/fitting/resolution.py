@@ -19,7 +19,7 @@ from tactile_cube.measurement.replay.windows import Windows, steps_per_row
 
 Array = NDArray[np.float64]
 FINER = 8  # times as short are the steps that show what the model's own ones do: 0.25 ms beside 2 ms
-ENOUGH = 12  # windows that tell it, spread over the recording: up to 53 s of a finger
+ENOUGH = 12  # windows that show it, spread over the recording: up to 53 s of a finger
 
 
 def step_shift(problem: Problem, fitted: Fit) -> Array:
@@ -184,7 +184,7 @@ def final_fit(problem: Problem, model: Model, unknowns: Sequence[Unknown], itera
 def standard_errors(problem: Problem, fitted: Fit, groups: Sequence[int] | None = None) -> Array:
     """Standard errors (P,) of the unknowns, in units of their scales; `groups` of segments that err alike, if any do.
 
-    The residual of a model that is not perfect remembers itself; so the scatter of the score is taken segment by
+    The residual of an imperfect model is autocorrelated; so the scatter of the score is taken segment by
     segment (cluster-robust), and never less than white noise as large as the residual would give: of few long segments
     the scatter says little.
     """

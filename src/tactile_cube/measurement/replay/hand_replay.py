@@ -84,7 +84,7 @@ class HandReplay:
         self._nominal = self._constants()
 
     def close(self) -> None:
-        """Ends the physics server."""
+        """End the physics server."""
         self._world.close()
 
     def simulate(self, trial: Trial, contact: ContactModel, offset: Array, until: float = np.inf) -> Simulated:
