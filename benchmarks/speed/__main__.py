@@ -69,8 +69,8 @@ def main() -> None:
     given = asked()
     os.environ.setdefault("OMP_NUM_THREADS", "1")  # one core against one core; torch reads it when it is imported
 
-    from benchmarks.speed.machine import busy, machine
-    from benchmarks.speed.table import table
+    from benchmarks.speed.report import table
+    from benchmarks.speed.timing import busy, machine
     from tactile_cube.agent.policy_file import current_commit
 
     command = shlex.join(["python", "-m", "benchmarks.speed", *sys.argv[1:]])

@@ -2,8 +2,7 @@
 
 import json
 
-from benchmarks.speed.report import Figure, Growth, Section, durations, rates
-from benchmarks.speed.table import table
+from benchmarks.speed.report import Figure, Growth, Section, durations, rates, table
 from benchmarks.speed.timing import Timing
 
 TIMINGS = {"ours": Timing(cpu=[0.1, 0.2, 0.3]), "peer": Timing(cpu=[0.4, 0.4, 0.4])}
