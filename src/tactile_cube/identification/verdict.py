@@ -11,7 +11,7 @@ from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.intervals import Fitted, final_fit
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.search.evidence import worse
-from tactile_cube.identification.search.explanation import Explanation, contains, named, proven, simplest
+from tactile_cube.identification.search.explanation import Explanation, contains, named, proven, simplest, sufficient
 from tactile_cube.identification.search.findings import Findings
 from tactile_cube.identification.search.residual_shape import Shape, black_box, missing_torques, shapes
 from tactile_cube.identification.search.search import Search
@@ -40,7 +40,7 @@ def decide(findings: Findings, criteria: Criteria = STANDARD) -> Verdict:
     """The answer to what a search has found."""
     base = findings.base
     found = findings.kept(criteria)
-    plausible = [one for one in found if not at_bound(one)]
+    plausible = sufficient([one for one in found if not at_bound(one)], criteria)
     if not found:
         small = base.largest_error <= criteria.adequate
         return Verdict("adequate", base) if small else Verdict("unknown_effect", closest((), findings, criteria))
