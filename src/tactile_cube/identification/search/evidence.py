@@ -78,6 +78,11 @@ def charged(costs: Array, samples: NDArray[np.int64], numbers: NDArray[np.int64]
     return np.asarray(costs + excess * ((independent / (independent - numbers)) ** 2 - 1.0))
 
 
+def joint_squares(problem: Problem, residual: Array) -> Array:
+    """Squared residuals (n,) of each joint's sensors, in units of the noise, with the starts of segments taken out."""
+    return np.asarray(np.maximum(_joint_squares(problem, residual)[0].sum(axis=0), 0.0))
+
+
 def joint_errors(problem: Problem, residual: Array) -> Array:
     """RMS (n,) of the residual of each joint's sensors with the starts of segments taken out."""
     squares, present = _joint_squares(problem, residual)
@@ -133,7 +138,7 @@ def likelihood(before: Judgement, after: Judgement) -> Array:
     """Twice the log likelihood (G,) that each segment gains by the second model, the size of its errors unknown.
 
     At the noise that is the difference of squared errors; far from it, ratios count, so that no single segment decides.
-    The sensor's variance counts as one more sample: a joint that rests, and a model in which it rests, differ by nothing.
+    The sensor's variance counts as one more sample: a joint that rests where its model does is infinitely likely else.
     """
     return np.asarray((before.samples + 1.0) * np.log((1.0 + before.costs) / (1.0 + after.costs)))
 
