@@ -138,7 +138,7 @@ def likelihood(before: Judgement, after: Judgement) -> Array:
     """Twice the log likelihood (G,) that each segment gains by the second model, the size of its errors unknown.
 
     At the noise that is the difference of squared errors; far from it, ratios count, so that no single segment decides.
-    The sensor's variance counts as one more sample: a joint that rests where its model does is infinitely likely else.
+    The sensor's variance counts as one sample more: else a joint that rests as its model does were infinitely likely.
     """
     return np.asarray((before.samples + 1.0) * np.log((1.0 + before.costs) / (1.0 + after.costs)))
 
