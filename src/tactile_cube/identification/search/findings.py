@@ -20,7 +20,7 @@ from tactile_cube.identification.search.explanation import (
     named_by,
     proven,
     simplest,
-    sufficient,
+    sound,
     unproven,
 )
 from tactile_cube.identification.search.proposals import (
@@ -100,7 +100,7 @@ def find(search: Search) -> Findings:
         looked,
     )
     if first and (good := found.proven(search.criteria)):
-        chosen = simplest(sufficient(good, search.criteria), search.criteria)
+        chosen = simplest(sound(good, search.criteria), search.criteria)
         search.stand(f"{chosen.label} ({chosen.error:.2f} x sensor noise on held-out trials)", "its possible twins")
         others = tuple(search.explained(one, looked) for one in twins(search, chosen, first, found.judged))
         found = replace(found, judged=(*found.judged, *others))
