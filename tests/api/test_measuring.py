@@ -99,6 +99,16 @@ def test_a_step_or_a_seed_that_is_none_is_refused(word: str, message: str) -> No
         worded_job("compare", ["recording=x", word])
 
 
+def test_a_name_that_stands_twice_and_a_band_of_no_size_are_told_at_once(tmp_path: Path) -> None:
+    folder = write(tmp_path)
+    with pytest.raises(InputError, match="effects: 'viscous_friction@a' is named twice"):
+        tactile_cube.identify(folder, ["viscous_friction", "viscous_friction(difference)@a"], say=quiet)
+    with pytest.raises(InputError, match="band.simulations=-3: Input should be greater than or equal to 0"):
+        tactile_cube.compare(folder, values={"band.simulations": -3})
+    with pytest.raises(InputError, match="band.spread.kp=x: Input should be a valid number"):
+        tactile_cube.compare(folder, values={"band.spread.kp": "x"})
+
+
 def test_an_effect_that_cannot_act_at_its_joint_is_told(tmp_path: Path) -> None:
     def one(columns: dict[str, np.ndarray]) -> None:
         for name in [name for name in columns if name.startswith("b.")]:

@@ -3,16 +3,18 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from omegaconf import OmegaConf
+from pydantic import Field
 
 from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
-from tactile_cube.drivetrain.model_file import ModelFile, as_model
+from tactile_cube.drivetrain.model_file import ModelFile, Strict, as_model
 from tactile_cube.errors import InputError, warn
 from tactile_cube.identification.contact.grasps import compare_contact
 from tactile_cube.measurement.bench import has_free_motion, with_object, without_touches
 from tactile_cube.measurement.comparing.comparison import USUAL_STEP, Comparison, compare_recording, comparison_json
+from tactile_cube.measurement.recordings.description import NotNegative
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.writing import require_free, write_recordings
@@ -150,6 +152,13 @@ def compare(
     return run_comparison(called_job("compare", locals()), recording, model, say)
 
 
+class BandSettings(Strict):
+    """How many randomised simulations make the band, and how far their constants spread."""
+
+    simulations: Annotated[int, Field(ge=0)]
+    spread: dict[str, NotNegative]
+
+
 def run_comparison(
     job: Job, recording: Recording | PathLike, model: ModelFile | PathLike | None, say: Say | None = None
 ) -> ComparisonResult:
@@ -162,9 +171,9 @@ def run_comparison(
         return ComparisonResult(compared, job, job.seconds)
     if held:
         say(f"{held} trials with an object are left out here; diagnose and identify use them")
-    spread = {str(key): float(value) for key, value in config.band.spread.items()}
-    band = (config.band.simulations, spread, config.seed)
-    compared = compare_recording(without_touches(recording), model, config.step, *band)
+    band = BandSettings.model_validate(OmegaConf.to_container(config.band))
+    randomised = (band.simulations, band.spread, config.seed)
+    compared = compare_recording(without_touches(recording), model, config.step, *randomised)
     return ComparisonResult(compared, job, job.seconds)
 
 

@@ -16,7 +16,7 @@ from tactile_cube.errors import InputError
 from tactile_cube.measurement.comparing.repeats import lag_between
 from tactile_cube.measurement.recordings.columns import SIGNALS, TrialColumns
 from tactile_cube.measurement.recordings.consistency import gains_of
-from tactile_cube.measurement.recordings.description import Description, PerJoint, Positive, Rate, TrialEntry
+from tactile_cube.measurement.recordings.description import Description, NotNegative, PerJoint, Positive, Rate, TrialEntry
 from tactile_cube.measurement.recordings.plausibility import torque_over_law
 from tactile_cube.measurement.recordings.rig import Rig, RigJoint
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable, cut_trial
@@ -94,7 +94,7 @@ class CsvFiles(Mechanism):
     calibration: str | None
     gear: float | None
     read: Literal["before", "after"]
-    resolution: float
+    resolution: NotNegative
     length: Positive | None
     initialisation: Sequence[int] | None
     kind: Sequence[str] | None
@@ -102,6 +102,8 @@ class CsvFiles(Mechanism):
     def recordings(self, seed: int) -> dict[str, RecordingTables]:
         """One recording of all files."""
         mode, rig = self.controller.mode, self.rig()
+        if mode != "voltage" and (self.controller.kt or self.controller.R):
+            raise InputError(f"source.controller.mode={mode}: kt and R are of mode=voltage; say that or leave them out")
         left: list[str] = []
         logs = self._logs([name for name, joint in rig.joints.items() if joint.mimics is None])
         columns = self._columns(logs[0], rig)

@@ -108,7 +108,7 @@ def recording_tables(settings: Mapping[str, Any], option: str, seed: int) -> dic
     try:
         checked: Source = TypeAdapter(source).validate_python(given)
     except ValidationError as error:
-        missing = [str(one["loc"][0]) for one in error.errors() if one["type"] == "missing"]
+        missing = [str(one["loc"][0]) for one in error.errors() if one["type"] == "missing" and len(one["loc"]) == 1]
         if missing:
             text = (CONFIG / "source" / f"{option}.yaml").read_text(encoding="utf-8")
             said = dict(re.findall(r"^ *(\w+): \?\?\? *# *(.*)$", text, re.MULTILINE))
@@ -126,5 +126,5 @@ def _refused(error: ValidationError, given: Mapping[str, Any]) -> str:
         if not isinstance(place, Mapping) or part not in place:
             break
         place, keys = place[part], [*keys, str(part)]
-    said = str(first["msg"]).removeprefix("Input should be ")
+    said = "more values" if first["type"] == "missing" else str(first["msg"]).removeprefix("Input should be ")
     return f"source.{'.'.join(keys)}={place}: expected {said}"

@@ -192,6 +192,8 @@ def calibrated_spans(path: Path) -> dict[str, float]:
     try:
         motors = json.loads(read_text(path))
         ticks = {name: float(one["range_max"]) - float(one["range_min"]) for name, one in motors.items()}
+    except InputError:
+        raise
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(
             f"{path}: not LeRobot's calibration, {{MOTOR: {{range_min: TICKS, range_max: TICKS}}}}: {error!r}"
