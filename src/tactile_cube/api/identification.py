@@ -199,7 +199,7 @@ def run_model_export(
     """Write the file of a job."""
     config = job.config
     if config.policy is not None:
-        raise InputError(f"policy={config.policy}, format={config.format}: a format is a model's; leave one of them out")
+        raise InputError(f"policy={config.policy}: format={config.format} is of a model; leave one of them out")
     if config.format not in ENDINGS:
         raise InputError(f"format={config.format}: choose one of {', '.join(ENDINGS)} for model={config.model}")
     if config.model is None and model is None:

@@ -209,7 +209,7 @@ def test_a_model_names_no_recording_outside_of_the_users_folder(
     [
         ({"bam.volts": -3}, "bam.volts=-3: expected a number of volts above 0"),
         ({"bam.volts": "many"}, "bam.volts=many: expected a number of volts above 0"),
-        ({"policy": "default"}, "policy=default, format=bam: a format is a model's; leave one of them out"),
+        ({"policy": "default"}, "policy=default: format=bam is of a model; leave one of them out"),
         ({"output": "."}, r"^output=\.: is a folder; name a file$"),
     ],
 )

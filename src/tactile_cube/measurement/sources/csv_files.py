@@ -16,7 +16,14 @@ from tactile_cube.errors import InputError
 from tactile_cube.measurement.comparing.repeats import lag_between
 from tactile_cube.measurement.recordings.columns import SIGNALS, TrialColumns
 from tactile_cube.measurement.recordings.consistency import gains_of
-from tactile_cube.measurement.recordings.description import Description, NotNegative, PerJoint, Positive, Rate, TrialEntry
+from tactile_cube.measurement.recordings.description import (
+    Description,
+    NotNegative,
+    PerJoint,
+    Positive,
+    Rate,
+    TrialEntry,
+)
 from tactile_cube.measurement.recordings.plausibility import torque_over_law
 from tactile_cube.measurement.recordings.rig import Rig, RigJoint
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable, cut_trial
