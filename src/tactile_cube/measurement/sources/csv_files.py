@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from tactile_cube.drivetrain.model_file import Strict
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.comparing.repeats import lag_between
-from tactile_cube.measurement.recordings.columns import SIGNALS, TrialColumns
+from tactile_cube.measurement.recordings.columns import OF_SOME, SIGNALS, TrialColumns
 from tactile_cube.measurement.recordings.consistency import gains_of
 from tactile_cube.measurement.recordings.description import (
     Description,
@@ -50,8 +50,6 @@ Array = NDArray[np.float64]
 Value = TypeVar("Value")
 Units = dict[str, dict[str, Unit]]
 """Joint -> signal -> unit."""
-OF_SOME = {"link_position": np.nan, "feedforward": 0.0}
-"""Signals that some joints may have, and what stands for those of the others."""
 SHOWN = 3  # steps of one kind
 REMEMBERED = 0.4  # [s] by which a drive has forgotten earlier commands, but for a rate limit
 MOVING, LOOK = 0.2, 0.03  # of a trial's usual speed, and [s] that it is read from
