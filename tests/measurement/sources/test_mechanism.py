@@ -143,7 +143,11 @@ def test_constants_of_a_servo_are_stated_where_nobody_says_others(tmp_path: Path
     assert float(recording.gains.torque_limit[0]) == pytest.approx(0.97 * stall, rel=1e-3)
     assert recording.gains.kd.tolist() == [0.3]
     assert recording.nominal["reflected_inertia"].tolist() == [0.0261]
-    assert "kd" not in recording.description.unknown
+    assert recording.description.unknown == ["reflected_inertia", "mass"]
+    weighed = imported(
+        tmp_path / "weighed", played("pendulum"), robot="pendulum", mass=0.4, servo="sts3215", controller={}
+    )
+    assert weighed.description.unknown == ["kp", "kd", "reflected_inertia"]
 
 
 def test_the_gain_of_the_firmware_counts() -> None:

@@ -233,7 +233,7 @@ class CsvFiles(Mechanism):
         said = with_stated({**stated, "mode": "torque" if mode == "free" else mode}, rig.gains, joints)
         nominal = with_stated(self.nominal, rig.nominal, joints)
         known = {*stated, *(key for key, value in self.nominal.items() if value is not None)}
-        unknown = [key for key in rig.unknown if key not in known and (key != "kd" or mode == "position")]
+        unknown = [key for key in rig.unknown if key not in known and (key not in ("kp", "kd") or mode == "position")]
         if mode == "position":
             lacking = [key for key in ("kp", "kd") if key not in said]
             lacking += [key for key in ("reflected_inertia",) if lacking and key not in nominal]

@@ -160,10 +160,10 @@ class Mechanism:
             return rig
         constants = read_servo(self.servo).constants(self.gain)
         stated = {**rig.stated, **{key: dict.fromkeys(rig.joints, value) for key, value in constants.items()}}
-        doubt = f"constants of the servo {self.servo} are those of another unit; its kd and rotor are identified"
-        return replace(
-            rig, stated=stated, stated_by=f"servo {self.servo}", unknown=("kd", "reflected_inertia"), doubts=(doubt,)
-        )
+        # beside a mass that is a guess, the gain is the scale of everything
+        unknown = ("kp", "kd", "reflected_inertia")[self.robot is not None and self.mass is None :]
+        doubt = f"constants of the servo {self.servo} are those of another unit; {', '.join(unknown)} are identified"
+        return replace(rig, stated=stated, stated_by=f"servo {self.servo}", unknown=unknown, doubts=(doubt,))
 
     def sized(self, rig: Rig, trials: Sequence[TrialTable], mode: str, kp: PerJoint | None, gravity: float) -> Rig:
         """Return it with the masses that logs show under gravity [m/s^2] where nobody says them."""
