@@ -43,16 +43,9 @@ AXES = {"pendulum": "0 1 0", "wheel": "0 0 1", "slide": "1 0 0"}
 
 
 def lever_rig(robot: str, mass: float = 1.0, lever: float = LEVER, hangs_at: float = 0.0) -> Rig:
-    """Return one of ROBOTS as a mechanism, whose joint has its name.
+    """Return one of ROBOTS (else an InputError): a mass [kg], of a wheel its rim's, at a lever [m] from the axis.
 
-    Args:
-        robot: of ROBOTS.
-        mass: at the end of the lever, of a wheel that of its rim [kg].
-        lever: from the axis to the mass [m].
-        hangs_at: angle at which a pendulum hangs down [rad].
-
-    Raises:
-        InputError: another robot.
+    A pendulum hangs down at an angle [rad].
     """
     if robot not in ROBOTS:
         raise InputError(f"source.robot={robot}: unknown; choose one of {', '.join(ROBOTS)}, or give source.urdf")
