@@ -198,6 +198,8 @@ def run_model_export(
 ) -> ModelExport:
     """Write the file of a job."""
     config = job.config
+    if config.policy is not None:
+        raise InputError(f"policy={config.policy}: format={config.format} is of a model; leave one of them out")
     if config.format not in ENDINGS:
         raise InputError(f"format={config.format}: choose one of {', '.join(ENDINGS)} for model={config.model}")
     if config.model is None and model is None:
@@ -206,6 +208,8 @@ def run_model_export(
         )
     known = as_model(config.model if model is None else model)
     output = Path(config.output or f"{Path(known.rig).name or 'model'}.{ENDINGS[config.format]}")
+    if output.is_dir():
+        raise InputError(f"output={output}: is a folder; name a file")
     if config.format == "bam":
         text, left = as_bam(known, config.bam.joint, config.bam.actuator, config.bam.volts)
     else:
