@@ -11,9 +11,9 @@ from tornado.ioloop import IOLoop
 
 from tactile_cube.identification.in_words import next_steps
 from tactile_cube.measurement.replay.model import effect_path
-from tactile_cube.measurement.units import milli
+from tactile_cube.measurement.units import milli, named
 from tactile_cube.visualization.charts import SIMULATED
-from tactile_cube.workbench.charts import ExperimentChart, MissingChart, TimeChart, named
+from tactile_cube.workbench.charts import ExperimentChart, MissingChart, TimeChart
 from tactile_cube.workbench.desk import Desk
 from tactile_cube.workbench.import_form import ImportForm
 from tactile_cube.workbench.importing import LOGS, RIGS, number
