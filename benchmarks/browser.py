@@ -49,12 +49,12 @@ MOVE = """async (moves) => {
 def workbench(*words: str, width: int = 1280) -> Iterator[tuple[Page, psutil.Process, Path]]:
     """A workbench in Chromium: its page, its server, the folder of its run."""
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=shutil.which("chromium"), args=ARGUMENTS)
         command = [sys.executable, "-m", "tactile_cube.workbench", "open=false", f"hydra.run.dir={folder}", *words]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
-            assert server.stdout is not None
-            address = next(found.group() for line in server.stdout if (found := re.search(r"http://\S+", line)))
-            browser = driver.chromium.launch(executable_path=shutil.which("chromium"), args=ARGUMENTS)
             try:
+                assert server.stdout is not None
+                address = next(found.group() for line in server.stdout if (found := re.search(r"http://\S+", line)))
                 page = browser.new_page(viewport={"width": width, "height": 900})
                 page.set_default_timeout(WAIT)
                 page.goto(address)

@@ -56,7 +56,7 @@ def _csv(columns: dict[str, np.ndarray], start: str, names: tuple[str, ...]) -> 
 class Walk:
     """Somebody at the page, whose actions are counted."""
 
-    def __init__(self, page: Page, out: Path | None) -> None:
+    def __init__(self, page: Page, out: Path | None = None) -> None:
         self.page, self.out, self.actions = page, out, 0
 
     def drop(self, logs: Logs) -> None:

@@ -93,7 +93,7 @@ class Page:
 
     def _compare_part(self) -> models.LayoutDOM:
         self.time, self.sentences = TimeChart(), text_of()
-        self.trial, self.joint = select("trial"), select("joint", width=90)
+        self.trial, self.joint = select("trial"), select("joint", width=120)
         self.other, self.where = select("beside", NONE), select("where it fails", NONE)
         self.over = models.MultiSelect(title="errors of other trials", size=3, width=190)
         for one in (self.trial, self.joint, self.other, self.over):
