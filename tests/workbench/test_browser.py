@@ -97,9 +97,11 @@ def window(browser: Any, served: tuple[str, Path, psutil.Process]) -> Iterator[A
 
 
 def picture(window: Any, name: str) -> None:
-    if PICTURES:
+    """Keep a picture of a step, narrow and wide."""
+    for width in (800, 1280) if PICTURES else ():
+        window.set_viewport_size({"width": width, "height": 900})
         window.wait_for_timeout(500)
-        window.screenshot(path=f"{PICTURES}/{name}.png", full_page=True)
+        window.screenshot(path=f"{PICTURES}/{name}_{width}.png", full_page=True)
 
 
 def drop(window: Any, *files: tuple[str, str]) -> None:
@@ -152,7 +154,6 @@ def test_from_dropped_logs_to_the_error_at_the_noise(
     assert over_noise(window, "refitted") > 10.0
     picture(window, "2_compare")
     window.set_viewport_size({"width": 800, "height": 900})
-    picture(window, "2_compare_narrow")
     heads = [window.get_by_role("heading", name=name, exact=True).bounding_box()["y"] for name in STORY]
     assert heads == sorted(heads)
     window.set_viewport_size({"width": 1280, "height": 900})
@@ -182,7 +183,6 @@ def test_from_dropped_logs_to_the_error_at_the_noise(
     assert window.get_by_text("train in it").count() == 0, "a lever is no hand"
     picture(window, "5_saved")
     window.set_viewport_size({"width": 800, "height": 900})
-    picture(window, "6_narrow")
     assert window.evaluate("document.documentElement.scrollWidth") <= 800
     assert read_model(served[1] / "model" / "model.yaml").effects[0].effect == STRIBECK
 
@@ -199,7 +199,6 @@ def test_from_a_bare_log_to_a_named_effect(window: Any, served: tuple[str, Path,
     walk.choose("a position is read", "after")
     picture(window, "11_one_joint")
     window.set_viewport_size({"width": 800, "height": 900})
-    picture(window, "11_one_joint_narrow")
     assert window.evaluate("document.documentElement.scrollWidth") <= 800
     window.set_viewport_size({"width": 1280, "height": 900})
     walk.click("Import")
