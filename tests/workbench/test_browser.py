@@ -355,7 +355,7 @@ def test_a_number_is_typed_and_fixed(window: Any, measured: Recording) -> None:
     window.get_by_role("button", name="Set", exact=True).click()
     window.get_by_role("cell", name="by hand").wait_for()
     window.get_by_role("button", name="Refit", exact=True).click()
-    window.get_by_text(re.compile(r"kd \[N m s/rad\]: 0.22 fixed")).wait_for()
+    window.get_by_text(re.compile(r"kd \[N m s/rad\] fixed: 0.22")).wait_for()
     window.get_by_label("value", exact=True).fill("0.2O")
     window.get_by_role("button", name="Set", exact=True).click()
     window.get_by_text("'0.2O' is no number").wait_for()

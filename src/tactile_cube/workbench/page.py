@@ -332,12 +332,11 @@ class Page:
 
     def _slider(self, one: Value) -> models.Slider:
         name = one.key.replace(f"@{self.joint.value}", "")
-        found = "" if one.interval is None else f" in [{one.interval[0]:.4g}, {one.interval[1]:.4g}]"
-        found = " fixed" if one.fixed else found
+        found = " fixed" if one.fixed else "" if one.interval is None else " in [{:.4g}, {:.4g}]".format(*one.interval)
         low, high = one.unknown.low, one.unknown.high
         slider = models.Slider(
             start=low, end=high, value=one.value, step=(high - low) / 1000, sizing_mode="stretch_width",
-            title=plain(f"{name} [{one.unit}]: {one.value:.4g}{found}; now", 3 * LABEL),
+            title=plain(f"{name} [{one.unit}]{found}", 3 * LABEL),
             format=models.PrintfTickFormatter(format="%.4g"),
         )  # fmt: skip
         slider.on_change("value", lambda attr, old, new: self._move(one, new))
