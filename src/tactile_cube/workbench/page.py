@@ -126,9 +126,9 @@ class Page:
 
     def _values_part(self) -> list[models.LayoutDOM]:
         self.values: dict[str, Value] = {}
-        self.sliders, self.number = column_of(), select("number")
+        self.sliders, self.number = column_of(), select("number", width=175)
         self._when(self.number, self._show_number)
-        self.typed = [field(title, 85) for title in ("value", "at least", "at most")]
+        self.typed = [field(title, 90) for title in ("value", "at least", "at most")]
         self.fixed = models.CheckboxGroup(labels=["fixed"], width=70, align="end")
         self.present = select("effects of the model", width=260)
         self.remove = button("Remove and refit", lambda: self._change("removing", self.present.value, Workbench.remove))
