@@ -103,7 +103,8 @@ def main() -> None:
         walk = Walk(page, args.pictures)
 
         def say(what: str) -> None:
-            print(f"{what}: {walk.actions} clicks and keys, {processor_seconds(server):.0f} s of the processor", flush=True)
+            took = processor_seconds(server)
+            print(f"{what}: {walk.actions} clicks and keys, {took:.0f} s of the processor", flush=True)
 
         walk.drop(servo(args.data) if of_servo else pendulum(args.data))
         page.get_by_text("still needed").wait_for()
