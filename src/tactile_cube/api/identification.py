@@ -48,7 +48,7 @@ class IdentificationResult:
     @property
     def text(self) -> str:
         """The error after each stage, and the values with their intervals."""
-        lines = [errors_by_stage(self.data["error"], self.model, self.recording.units)]
+        lines = [errors_by_stage(self.data["error"], self.model, self.recording.shown)]
         for parameter in self.contact.silent if self.contact else []:
             lines.append(f"warning: {parameter}: no trial shows it; its interval is the whole range that was searched")
         return "\n".join(lines)
@@ -65,7 +65,7 @@ class IdentificationResult:
             if self.free is not None:
                 write_report(self._free_page(aside, path, self.free), aside / "report.html")
             elif self.contact is not None:
-                page = contact_report(self.contact, self.model.rig, self.job.command, path)
+                page = contact_report(self.contact, self.recording, self.job.command, path)
                 write_report(page, aside / "report.html")
 
     def _free_page(self, folder: Path, path: str, found: Identification) -> Any:
@@ -75,7 +75,7 @@ class IdentificationResult:
         config, recording = self.job.config, without_touches(self.recording)
         after = compare_recording(recording, self.model, config.step, floor=found.floor)
         write_comparison(after, folder / "identification.rrd")
-        held = [held_section(self.contact.errors, self.contact.joint_errors)] if self.contact else []
+        held = [held_section(self.contact.errors, self.contact.joint_errors, recording.shown)] if self.contact else []
         stages, joints = self.data["error"], self.data["joints"]
         return identification_report(after, stages, joints, self.job.command, path, held)
 

@@ -78,7 +78,10 @@ def _encoding(start: bytes) -> str:
 
 
 def _fields(line: str, separator: str) -> list[str]:
-    fields = next(csv.reader(line.splitlines()[:1], delimiter=separator), [])
+    try:
+        fields = next(csv.reader(line.splitlines()[:1], delimiter=separator), [])
+    except csv.Error:  # 130 kB without this separator: another one may stand in the line
+        return []
     return [field.strip().strip("\ufeff") for field in fields]
 
 
