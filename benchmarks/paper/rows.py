@@ -16,8 +16,12 @@ from tactile_cube.evaluation.summary import wilson_interval
 
 Results = dict[str, Any]
 EVALUATE = "python -m tactile_cube.evaluate"
-TRAIN = "python -m tactile_cube.train +experiment=curriculum`, then `+experiment=finetune"
-"""As the recipes were named at the commit that made `published`; today's `curriculum` is another."""
+TRAIN = (
+    "python -m tactile_cube.train +experiment=curriculum` at 9810f65, ended by hand after 262 500 steps, then, after "
+    "337 500, `+experiment=finetune training.init_from=outputs/train/curriculum-seed0/checkpoint.pt agent.gamma=0.95 "
+    "training.replay_size=300000"
+)
+"""With the recipes of the commits that made `published`; today's `curriculum` is another."""
 HEAD = "| experiment | paper | here | command | commit |"
 SCRIPTED, REPLAY = "scripted", "replay"
 FINGER = "outputs/finger"

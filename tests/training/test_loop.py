@@ -100,18 +100,18 @@ def test_warm_start_takes_networks_from_checkpoint_and_policy(tmp_path: Path) ->
             assert torch.equal(mine, theirs)
 
 
-def test_an_actor_without_its_critics_waits_for_fresh_ones_unless_told_otherwise(tmp_path: Path) -> None:
+def test_an_actor_without_its_critics_waits_for_fresh_ones_and_so_does_the_temperature(tmp_path: Path) -> None:
     finish(tiny_run(tmp_path / "first", steps=80))
     policy, checkpoint = (str(tmp_path / "first" / file) for file in ("policy.safetensors", "checkpoint.pt"))
     new = tiny_run(tmp_path / "policy", init_from=policy)
-    given = list(new.learner.agent.policy().parameters())
+    given = [*new.learner.agent.policy().parameters(), new.learner.agent.loss.log_alpha]
     assert new.learner.settings.actor_frozen == FROZEN
     assert tiny_run(tmp_path / "checkpoint", init_from=checkpoint).learner.settings.actor_frozen is None
     for updates, still in ((1000, True), (3, False)):
         run = tiny_run(tmp_path / f"next-{updates}", init_from=policy, actor_frozen=updates)
         finish(run)
-        after = run.learner.agent.policy().parameters()
-        assert all(torch.equal(a, b) for a, b in zip(after, given, strict=True)) == still
+        after = [*run.learner.agent.policy().parameters(), run.learner.agent.loss.log_alpha]
+        assert {torch.equal(a, b) for a, b in zip(after, given, strict=True)} == {still}
 
 
 def test_a_run_says_how_much_ctrl_c_costs_and_whose_networks_it_begins_with(

@@ -107,12 +107,13 @@ class Agent(ABC):
     def follow(self) -> None:
         """Let the target critics follow the critics by `settings.tau`."""
 
-    def update(self, batch: TensorDictBase) -> dict[str, Tensor]:
+    def update(self, batch: TensorDictBase, actor: bool = True) -> dict[str, Tensor]:
         """One gradient step of critics, actor and temperature, then of the target critics.
 
         Args:
             batch: replayed transitions (size,), as TorchRL's losses read them. The reward sums "steps_to_next_obs"
                 discounted ones, "terminated" leaves out time limits, "demonstrated" marks demonstrations.
+            actor: whether actor and temperature take part.
 
         Returns:
             Scalars on the agent's device: critic_loss, actor_loss (without imitation), alpha, entropy, value.
@@ -122,6 +123,8 @@ class Agent(ABC):
             losses = self.losses(batch.to(self.device))
         total: Tensor = losses["loss_qvalue"] + losses["loss_actor"] + losses["loss_alpha"]
         torch.autograd.backward(total)
+        for parameter in () if actor else (*self.actor.parameters(), self.loss.log_alpha):
+            parameter.grad = None
         self.optimizer.step()
         self.optimizer.zero_grad()
         self.follow()

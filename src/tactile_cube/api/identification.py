@@ -47,7 +47,7 @@ class IdentificationResult:
     @property
     def text(self) -> str:
         """The error after each stage, and the values with their intervals."""
-        lines = [errors_by_stage(self.data["error"], self.model, self.recording.units)]
+        lines = [errors_by_stage(self.data["error"], self.model, self.recording.shown)]
         for parameter in self.contact.silent if self.contact else []:
             lines.append(f"warning: {parameter}: no trial shows it; its interval is the whole range that was searched")
         return "\n".join(lines)
@@ -64,7 +64,7 @@ class IdentificationResult:
             if self.free is not None:
                 write_report(self._free_page(aside, path, self.free), aside / "report.html")
             elif self.contact is not None:
-                page = contact_report(self.contact, self.model.rig, self.job.command, path)
+                page = contact_report(self.contact, self.recording, self.job.command, path)
                 write_report(page, aside / "report.html")
 
     def _free_page(self, folder: Path, path: str, found: Identification) -> Any:
@@ -74,7 +74,7 @@ class IdentificationResult:
         config, recording = self.job.config, without_touches(self.recording)
         after = compare_recording(recording, self.model, config.step, floor=found.floor)
         write_comparison(after, folder / "identification.rrd")
-        held = [held_section(self.contact.errors, self.contact.joint_errors)] if self.contact else []
+        held = [held_section(self.contact.errors, self.contact.joint_errors, recording.shown)] if self.contact else []
         stages, joints = self.data["error"], self.data["joints"]
         return identification_report(after, stages, joints, self.job.command, path, held)
 
@@ -197,6 +197,8 @@ def run_model_export(
 ) -> ModelExport:
     """Write the file of a job."""
     config = job.config
+    if config.policy is not None:
+        raise InputError(f"policy={config.policy}: format={config.format} is of a model; leave one of them out")
     if config.format not in ENDINGS:
         raise InputError(f"format={config.format}: choose one of {', '.join(ENDINGS)} for model={config.model}")
     if config.model is None and model is None:
@@ -205,6 +207,8 @@ def run_model_export(
         )
     known = as_model(config.model if model is None else model)
     output = Path(config.output or f"{Path(known.rig).name or 'model'}.{ENDINGS[config.format]}")
+    if output.is_dir():
+        raise InputError(f"output={output}: is a folder; name a file")
     if config.format == "bam":
         text, left = as_bam(known, config.bam.joint, config.bam.actuator, config.bam.volts)
     else:

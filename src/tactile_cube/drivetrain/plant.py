@@ -201,6 +201,19 @@ class Plant:
         Per-joint constants hold n (repeated in every chain) or C n numbers; gravity (3,) or (C, 3) [m/s^2] is in the
         frame of each chain's base.
         """
+        memory = self._blank.copy()
+        for key in ("gravity", "engine_gravity"):
+            self.view(memory, key)[...] = gravity
+        self.set_constants(memory, constants)
+        for effect in effects:
+            for joint in matching_joints(effect.joint, self.joint_names):
+                self.set_effect(memory, type(effect), joint, effect.values)
+        self.reset(memory, np.zeros(self.topology.joints))
+        return memory
+
+    @cached_property
+    def _blank(self) -> Array:
+        """What every memory (size,) holds: the mechanism, the step and where things lie."""
         memory = np.zeros(self.size)
         header = {"dt": self.dt, "trace_rows": self.trace_rows, "reading": LAST_SUBSTEP}
         for key, value in {**header, "trace_offset": self.layout.entries["trace"][0], "unsure": UNSURE}.items():
@@ -210,15 +223,7 @@ class Plant:
         self.view(memory, "state_size")[...] = [shape[1] for _, shape in states]
         for key in TREE_KEYS:
             self.view(memory, key)[...] = np.stack([getattr(tree, key) for tree in self.trees])
-        for key in ("gravity", "engine_gravity"):
-            self.view(memory, key)[...] = gravity
         self.view(memory, "contact_torque_limit")[...] = CONTACT_TORQUE_LIMIT
-        self.set_constants(memory, constants)
-        self.view(memory, "command_torque_limit")[...] = self.view(memory, "torque_limit")
-        for effect in effects:
-            for joint in matching_joints(effect.joint, self.joint_names):
-                self.set_effect(memory, type(effect), joint, effect.values)
-        self.reset(memory, np.zeros(self.topology.joints))
         return memory
 
     def set_constants(self, memory: Array, constants: DrivetrainConstants) -> None:
@@ -229,6 +234,7 @@ class Plant:
             if size not in (0, count, self.topology.joints):
                 raise InputError(f"drivetrain {key} has {size} values for {count} joints; give one or one each")
             self.view(memory, key)[...] = np.tile(value, self.topology.chains) if size == count else value
+        self.view(memory, "command_torque_limit")[...] = self.view(memory, "torque_limit")
 
     def set_effect(self, memory: Array, effect: EffectClass, joint: str, values: Mapping[str, float | Array]) -> None:
         """Switch an effect on at a joint of memory (..., size); values may be (batch,) arrays.
@@ -269,8 +275,9 @@ class Plant:
         for key in ("extra", "extra_compliance", "held_back", "contact", "signals", "seen"):
             self.view(memory, key)[...] = 0.0
         self.view(memory, "step")[...] = time / self.dt
-        for effect in self.effects:
-            self.view(memory, f"state:{effect.name}")[...] = 0.0
+        if self.effects:  # their states follow each other
+            first, _ = self.layout.entries[f"state:{self.effects[0].name}"]
+            memory[..., first : self.layout.entries["trace"][0]] = 0.0
         by_chain = (*memory.shape[:-1], self.topology.chains, len(self.topology.leader))
         rows = self.view(memory, "signals")
         for row, key in _STARTING_ROWS.items():

@@ -226,7 +226,7 @@ def diagnose_recording(
     recording = in_steps(recording, effects, known, say)
     whole = Inquiry(recording, effects, seed, say, known, criteria)
     standard = fit_standard_model(*whole.parts[:2], noise_with_links(recording), known, effects)
-    first = standard.sentence(common_unit(recording.units.values()))
+    first = standard.sentence(common_unit(recording.shown.values()))
     say.answer, say.following = first.partition(";")[0], "the stated model with its constants refitted"
     say(first)
     inquiry, left_out, suspected = beside_disturbances(whole)

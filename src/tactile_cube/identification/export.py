@@ -169,6 +169,8 @@ def as_bam(model: ModelFile, joint: str | None, actuator: str | None, volts: flo
     drive = drives_of(model)[0 if joint is None else names.index(joint)]
     if not actuator:
         raise InputError("format=bam: give bam.actuator=NAME, the servo's name in BAM, such as sts3215 or xl330")
+    if volts is not None and not (isinstance(volts, int | float) and 0.0 < volts < inf):
+        raise InputError(f"bam.volts={volts}: expected a number of volts above 0, vin * kp * error_gain in BAM")
     law = "m2" if drive.excess else "m1"
     data: dict[str, object] = {"model": law, "actuator": actuator, "armature": drive.armature}
     data |= {"friction_base": drive.friction, "friction_viscous": drive.damping, "command_delay": drive.delay}

@@ -78,7 +78,9 @@ def identify_effects(
         InputError: an unknown effect, joint or parameter, or nothing to hold out.
     """
     wanted = [one for text in effects for one in _wanted(text, recording.joints)]
-    classes = tuple(dict.fromkeys(effect for effect, *_ in wanted))
+    classes, places = tuple(dict.fromkeys(effect for effect, *_ in wanted)), [one[:2] for one in wanted]
+    if twice := next((one for k, one in enumerate(places) if one in places[:k]), None):
+        raise InputError(f"effects: '{twice[0].name}@{twice[1]}' is named twice; name it once")
     search, floor = divided(recording, classes, seed, say)
     held_out, base = search.held_out, search.base
     stages = {"nominal": search.start_held_out, "refitted": base.judgement.model}

@@ -132,14 +132,13 @@ class SingleCollection:
 
     def _aside(self, call: Callable[[], Any]) -> Any:
         """Run a call on the collection's own random state, as if it were another process."""
-        learner_state, started = torch.get_rng_state(), time.thread_time()
-        torch.set_rng_state(self._random_state)
-        try:
-            return call()
-        finally:
+        started = time.thread_time()
+        with torch.random.fork_rng(devices=[]):
+            torch.set_rng_state(self._random_state)
+            result = call()
             self._random_state = torch.get_rng_state()
-            torch.set_rng_state(learner_state)
-            self._cpu += time.thread_time() - started
+        self._cpu += time.thread_time() - started
+        return result
 
 
 class MultiSyncCollection:

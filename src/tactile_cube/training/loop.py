@@ -65,11 +65,9 @@ class Learner:
         self.conditions = self.collection.launch(self.agent.policy(), random, self._progress())
         weights = self.reward_weights(self.conditions)
         if self.steps >= self.settings.learning_starts:
-            frozen = self.agent.policy() if self.updates < (self.settings.actor_frozen or 0) else None
+            actor = self.updates >= (self.settings.actor_frozen or 0)
             for _ in range(self.settings.updates_per_iteration):
-                self.metrics = self.agent.update(self.replay.sample(self.agent.settings.batch_size, weights))
-                if frozen is not None:
-                    self.agent.load_actor(frozen)
+                self.metrics = self.agent.update(self.replay.sample(self.agent.settings.batch_size, weights), actor)
             self.updates += self.settings.updates_per_iteration
         block = self.collection.take()
         self._require_finite(block)

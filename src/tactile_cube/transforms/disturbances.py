@@ -63,15 +63,11 @@ class JointOffset(Transform):  # type: ignore[misc]
         self.offset = torch.where(mask, drawn, self.offset)
         return self._call(tensordict_reset)
 
-    def _call(self, next_tensordict: TensorDictBase) -> TensorDictBase:
-        for key in self.in_keys:
-            next_tensordict.set(key, next_tensordict.get(key) + self.offset)
-        return next_tensordict
+    def _apply_transform(self, obs: Tensor) -> Tensor:
+        return obs + self.offset
 
-    def _inv_call(self, tensordict: TensorDictBase) -> TensorDictBase:
-        for key in self.in_keys_inv:
-            tensordict.set(key, tensordict.get(key) - self.offset / self.half_range)
-        return tensordict
+    def _inv_apply_transform(self, state: Tensor) -> Tensor:
+        return state - self.offset / self.half_range
 
 
 class SensorNoise(Transform):  # type: ignore[misc]
@@ -125,14 +121,10 @@ class StickyAction(Transform):  # type: ignore[misc]
         self._fresh = mask if self._fresh is None else self._fresh | mask
         return tensordict_reset
 
-    def _inv_call(self, tensordict: TensorDictBase) -> TensorDictBase:
-        (key,) = self.in_keys_inv
-        action = tensordict.get(key)
-        if self._fresh is None or self._last is None:
-            self._last = action
-        stick = torch.rand((*action.shape[:-1], 1)) < self.probability
+    def _inv_apply_transform(self, state: Tensor) -> Tensor:
+        stick = torch.rand((*state.shape[:-1], 1)) < self.probability
         if self._fresh is not None:
             stick &= ~self._fresh
-        self._last = torch.where(stick, self._last, action)
+        self._last = torch.where(stick, state if self._last is None else self._last, state)
         self._fresh = torch.zeros_like(stick)
-        return tensordict.set(key, self._last)
+        return self._last

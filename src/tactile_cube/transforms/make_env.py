@@ -53,13 +53,11 @@ class OwnGeneratorEnv(TransformedEnv):  # type: ignore[misc]
 
     @contextmanager
     def _drawing(self) -> Iterator[None]:
-        others = torch.get_rng_state()
-        torch.set_rng_state(others if self._generator is None else self._generator)
-        try:
+        with torch.random.fork_rng(devices=[]):
+            if self._generator is not None:
+                torch.set_rng_state(self._generator)
             yield
-        finally:
             self._generator = torch.get_rng_state()
-            torch.set_rng_state(others)
 
 
 ALMOST_ALL = 1.0 - 1e-9

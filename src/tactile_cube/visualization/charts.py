@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tactile_cube.evaluation.evaluation import VariantResult
 from tactile_cube.evaluation.training_curve import ANGLE, CURRICULUM, REGRASPING, STEPS, Curve
 from tactile_cube.measurement.comparing.comparison import Comparison
-from tactile_cube.measurement.units import THOUSANDTHS
+from tactile_cube.measurement.units import SMALL, shown
 from tactile_cube.whole_file import write_whole
 
 Array = NDArray[np.float64]
@@ -143,30 +143,31 @@ def overlay(comparison: Comparison, trial: int, joint: int, before: Comparison |
     With `before`, the comparison of the model as it was, its simulation is drawn too.
     """
     one, name = comparison.recording.trials[trial], comparison.recording.joints[joint]
-    axes = time_chart(f"{name} [{comparison.recording.units[name]}]")
+    unit = comparison.recording.shown[name]
+    axes, size = time_chart(f"{name} [{unit}]"), shown("[rad]", unit)[1]
     _shade(axes, comparison, trial, joint)
     if not comparison.recording.torque_controlled:
-        axes.plot(one.time, one.command[:, joint], "--", color=FLOOR, linewidth=1.0, label="command")
-    axes.plot(one.time, _measured(comparison, trial, joint), color=MEASURED, linewidth=1.8, label="measured")
+        axes.plot(one.time, size * one.command[:, joint], "--", color=FLOOR, linewidth=1.0, label="command")
+    axes.plot(one.time, size * _measured(comparison, trial, joint), color=MEASURED, linewidth=1.8, label="measured")
     if before is not None:
-        axes.plot(one.time, _simulated(before, trial, joint), "--", color=BEFORE, label="simulated before")
+        axes.plot(one.time, size * _simulated(before, trial, joint), "--", color=BEFORE, label="simulated before")
     after = "simulated" if before is None else "simulated after"
-    axes.plot(one.time, _simulated(comparison, trial, joint), color=SIMULATED, linewidth=1.4, label=after)
+    axes.plot(one.time, size * _simulated(comparison, trial, joint), color=SIMULATED, linewidth=1.4, label=after)
     return svg(axes)
 
 
 def residual(comparison: Comparison, trial: int, joint: int, before: Comparison | None = None) -> str:
     """Measured minus simulated of one joint in one trial beside the noise floor; with `before`, also of that model."""
     time = comparison.recording.trials[trial].time
-    axes = _difference_chart(comparison, joint, 170 if before is None else 200)
-    floor = 1e3 * 1.96 * comparison.floor.joints[comparison.recording.joints[joint]]
+    axes, size = _difference_chart(comparison, joint, 170 if before is None else 200)
+    floor = size * 1.96 * comparison.floor.joints[comparison.recording.joints[joint]]
     axes.axhspan(-floor, floor, color=FLOOR, alpha=0.18, linewidth=0, label="noise floor (95 %)")
-    errors = 1e3 * comparison.residuals[trial][:, joint]
+    errors = size * comparison.residuals[trial][:, joint]
     if before is None:
         _shade(axes, comparison, trial, joint)
         axes.plot(time, errors, color=ERROR, linewidth=1.2, label="measured - simulated")
     else:
-        axes.plot(time, 1e3 * before.residuals[trial][:, joint], color=BEFORE, linewidth=1.2, label="error before")
+        axes.plot(time, size * before.residuals[trial][:, joint], color=BEFORE, linewidth=1.2, label="error before")
         axes.plot(time, errors, color=SIMULATED, linewidth=1.4, label="error after")
     return svg(axes)
 
@@ -177,20 +178,22 @@ def band(comparison: Comparison, trial: int, joint: int) -> str:
     if randomised is None:
         return ""
     nominal = comparison.simulated[trial].position[:, joint]
-    low, high = (1e3 * (edge[trial][:, joint] - nominal) for edge in (randomised.low, randomised.high))
-    axes = _difference_chart(comparison, joint, 200)
+    axes, size = _difference_chart(comparison, joint, 200)
+    low, high = (size * (edge[trial][:, joint] - nominal) for edge in (randomised.low, randomised.high))
     few = slice(None, None, max(1, len(time) // MOST_POINTS))
     axes.fill_between(
         time[few], low[few], high[few], color=SIMULATED, alpha=0.25, linewidth=0, label="95 % of the simulations"
     )
-    measured = 1e3 * (_measured(comparison, trial, joint) - nominal)
+    measured = size * (_measured(comparison, trial, joint) - nominal)
     axes.plot(time, measured, color=MEASURED, linewidth=1.2, label="measured")
     return svg(axes)
 
 
-def _difference_chart(comparison: Comparison, joint: int, height: int) -> Axes:
+def _difference_chart(comparison: Comparison, joint: int, height: int) -> tuple[Axes, float]:
+    """Axes of a joint's errors, and how many of their unit make a rad or m."""
     name = comparison.recording.joints[joint]
-    return time_chart(f"{name} [{THOUSANDTHS[comparison.recording.units[name]]}]", height)
+    unit, size = SMALL[comparison.recording.shown[name]]
+    return time_chart(f"{name} [{unit}]", height), size
 
 
 def _shade(axes: Axes, comparison: Comparison, trial: int, joint: int) -> None:

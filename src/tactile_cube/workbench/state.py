@@ -51,7 +51,7 @@ Array = NDArray[np.float64]
 STATED, REFITTED, BY_HAND = "stated", "refitted", "by hand"
 BEGUN = 2  # stages of a model to which nothing was added: stated, refitted
 AT_ONCE = 24  # candidates that are screened between two looks at who waits
-RANKED = 10  # effects that a look shows
+RANKED, LEAST = 10, 0.005  # effects that a look shows, and the share that each takes away at least
 ALIKE = 0.95  # correlation of what two laws change, beside all constants, from which on these trials do not part them
 MOST = 50
 """Changes that can be undone; each keeps a fit and a judgement, some MB."""
@@ -193,7 +193,7 @@ class Workbench:
             share = 1.0 - found.cost / max(frozen.cost, 1e-12)
             look = Look(candidate, found.model, frozen.residual - found.residual, share)
             best[look.name] = max(look, best.get(look.name, look), key=lambda one: one.share)
-        ranked = sorted((one for one in best.values() if one.share > 0.0), key=lambda one: -one.share)[:RANKED]
+        ranked = sorted((one for one in best.values() if one.share >= LEAST), key=lambda one: -one.share)[:RANKED]
         self._looks |= {f"{one.name}@{joint}": one for one in ranked}
         return _together(ranked, Screen(problem, frozen)) if ranked else []
 

@@ -204,6 +204,24 @@ def test_a_model_names_no_recording_outside_of_the_users_folder(
     assert not list(Path().glob("*.xml"))
 
 
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ({"bam.volts": -3}, "bam.volts=-3: expected a number of volts above 0"),
+        ({"bam.volts": "many"}, "bam.volts=many: expected a number of volts above 0"),
+        ({"policy": "default"}, "policy=default: format=bam is of a model; leave one of them out"),
+        ({"output": "."}, r"^output=\.: is a folder; name a file$"),
+    ],
+)
+def test_a_wrong_setting_writes_no_file(
+    settings: dict[str, object], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match=said):
+        tactile_cube.export_model(model(), "bam", values={"bam.actuator": "sts3215", **settings})
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_format_without_a_model_is_no_policys(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

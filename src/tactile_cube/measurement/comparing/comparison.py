@@ -185,8 +185,8 @@ def describe_comparison(
         floor=floor,
         regimes=table,
         sentences=[
-            *where_it_fails(table, summary.joints, floor, recording.units),
-            *(one.sentence(recording.units[one.joint]) for one in floor.drift),
+            *where_it_fails(table, summary.joints, floor, recording.shown),
+            *(one.sentence(recording.shown[one.joint]) for one in floor.drift),
         ],
         whiteness=whiteness(trials, errors, joints),
         failing_intervals=[

@@ -105,8 +105,11 @@ def nominal_model(recording: Recording, known: ModelFile | None = None) -> Model
         given = {name: estimate.value for name, estimate in one.parameters.items()}
         free = tuple(name for name, estimate in one.parameters.items() if estimate.high > estimate.low)
         expected = {name: (e.value, 0.5 * (e.high - e.low)) for name, e in one.parameters.items() if name in free}
-        placed = resolve([one.effect], recording.joints)
-        terms += [Term(kind, joint, kind(joint, **given).values, free, expected) for kind, joint in placed]
+        try:
+            placed = [(kind, joint, kind(joint, **given)) for kind, joint in resolve([one.effect], recording.joints)]
+        except InputError as error:
+            raise InputError(f"model: {error}") from None
+        terms += [Term(kind, joint, effect.values, free, expected) for kind, joint, effect in placed]
     return Model(constants, tuple(terms), no_offsets(recording))
 
 

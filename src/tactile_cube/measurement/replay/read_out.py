@@ -54,7 +54,7 @@ def free_way(plant: Plant, memory: Array, jump: Array, lead: Array, gain: Array)
 
     Memory is (..., size), `jump` (..., n); `lead` and `gain` are the signals LEAD and LOOP_GAIN after the jump.
     """
-    if Backlash not in plant.effects:
+    if not gaps(plant, memory).any():
         return np.zeros_like(jump)
     p = plant.view(memory, "parameters:backlash")
     return Backlash.free_lead(lead, p, gain) - Backlash.free_lead(lead - jump, p, gain)
