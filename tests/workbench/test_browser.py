@@ -22,7 +22,7 @@ import pytest
 import yaml
 
 from tactile_cube.drivetrain.model_file import read_model
-from tactile_cube.identification.fitting.intervals import Fitted
+from tactile_cube.identification.fitting.resolution import Fitted
 from tactile_cube.identification.in_words import PARTIAL
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.workbench.background import Found

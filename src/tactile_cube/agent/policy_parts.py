@@ -2,7 +2,7 @@
 
 The file may come from anywhere, and Hydra makes whatever a configuration names. So all that any command has made of it
 passes `require_parts` first. It names no class that is not in `PARTS`, gives Hydra no other instruction, refers to
-nothing outside itself (`${...}`), and has no file read but those of the package: who has the hand, the object or the
+nothing outside itself (`${...}`), and names only shipped files: who has the hand, the object or the
 grasps in files of their own names them on the command line.
 """
 

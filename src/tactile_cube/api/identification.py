@@ -10,15 +10,14 @@ from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
 from tactile_cube.drivetrain.model_file import Estimate, ModelFile, as_model, write_model
 from tactile_cube.errors import InputError
 from tactile_cube.identification.contact.identification import ContactIdentification, contact_effects, identify_contact
-from tactile_cube.identification.export.joint_drive import as_bam
-from tactile_cube.identification.export.robot_file import as_mjcf, as_urdf
+from tactile_cube.identification.export import as_bam, as_mjcf, as_urdf
 from tactile_cube.identification.identification import Identification, identify_effects
 from tactile_cube.identification.in_words import errors_by_stage
 from tactile_cube.identification.model_files import model_file, stated_model
 from tactile_cube.measurement.bench import has_free_motion, touch_offsets, without_touches
 from tactile_cube.measurement.comparing.comparison import compare_recording
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.nominal import nominal_model, require_same_joints
+from tactile_cube.measurement.replay.model import nominal_model, require_same_joints
 from tactile_cube.untrusted_file import below
 from tactile_cube.whole_file import write_json, write_whole, written_together
 

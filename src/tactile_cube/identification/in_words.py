@@ -1,14 +1,12 @@
 """The diagnosis and the next experiment in plain words."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.next_experiment import FILE, Experiment
 from tactile_cube.identification.safe_commands import QUANTITIES, SCALES, TRIALS
-from tactile_cube.measurement.comparing.repeats import Drift
+from tactile_cube.measurement.comparing.noise_floor import Drift
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.units import TURNS, common_unit, milli, named, of_joint, short
 
@@ -115,7 +113,7 @@ def left_over(result: Mapping[str, Any]) -> str:
     left = milli(error["with_effects"], common_unit(result.get("shown_in", result.get("units", {})).values()))
     windows = result.get("error_over_noise", {}).get("with_effects", floors)
     if windows < LEFT < floors:
-        return f" ({windows:.2f} sensor noises remain in short windows; run freely, the model parts by {left})"
+        return f" ({windows:.2f} sensor noises remain in short windows; in a free run it deviates by {left})"
     return f" ({left} remain, {short(floors, 2)} noise floors)" if floors > LEFT else ""
 
 

@@ -119,7 +119,7 @@ def shape_section(shapes: Sequence[Shape], units: Mapping[str, str] | None = Non
 
 
 def ranking_section(ranking: Sequence[Any]) -> list[Section]:
-    """The candidates that were weighed, best first."""
+    """Return the section of the candidates considered, best first."""
     rows = [row for row in ranking if isinstance(row, Mapping)][:MOST_RANKED]
     if not rows:
         return []
@@ -130,7 +130,7 @@ def ranking_section(ranking: Sequence[Any]) -> list[Section]:
     ]
     table = Table([COLUMNS.get(key, key) for key in keys], cells)
     text = ["Rows without numbers were given up after a first look: others explained more."]
-    return [Section("What else was weighed", text, [table], folded=True)]
+    return [Section("Candidates considered", text, [table], folded=True)]
 
 
 def value_section(comparison: Comparison) -> Section:

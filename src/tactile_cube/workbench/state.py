@@ -20,8 +20,8 @@ from tactile_cube.errors import InputError
 from tactile_cube.identification.diagnosis import Unseen, in_steps, test_errors, unseen
 from tactile_cube.identification.disturbances import in_time
 from tactile_cube.identification.fitting.gauss_newton import Fit, renewed
-from tactile_cube.identification.fitting.intervals import NORMAL_95, Fitted, standard_errors
 from tactile_cube.identification.fitting.problem import Problem
+from tactile_cube.identification.fitting.resolution import NORMAL_95, Fitted, standard_errors
 from tactile_cube.identification.identification import with_effect
 from tactile_cube.identification.model_files import UNITS, model_file
 from tactile_cube.identification.next_experiment import Experiment, next_experiment
@@ -38,8 +38,7 @@ from tactile_cube.measurement.comparing.error import ErrorSummary
 from tactile_cube.measurement.comparing.noise_floor import noise_floor, noise_with_links
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
-from tactile_cube.measurement.replay.model import Model, effect_path
-from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.model import Model, effect_path, nominal_model
 from tactile_cube.measurement.replay.simulator import Simulated, free_run
 from tactile_cube.measurement.split import held_out_split, with_test_part
 from tactile_cube.measurement.units import of_joint

@@ -17,10 +17,10 @@ from tactile_cube.drivetrain.model_file import ModelFile, write_model
 from tactile_cube.errors import InputError
 from tactile_cube.export import main
 from tactile_cube.hand.mjcf import read_mjcf
-from tactile_cube.identification.export.joint_drive import drives_of
+from tactile_cube.identification.export import drives_of
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
-from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.model import nominal_model
 from tactile_cube.measurement.replay.simulator import free_run
 
 ARM = """<robot name="arm"><link name="base"/><link name="upper"><inertial><origin xyz="0.08 0 0"/><mass value="0.3"/>

@@ -1,7 +1,5 @@
 """Bounded Levenberg-Marquardt on the marginal likelihood of a multiple-shooting problem."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -113,10 +111,10 @@ def _evaluated(problem: Problem, near: Fit, model: Model) -> Fit:
 
 
 def noise_inflation(problem: Problem, cost: float) -> float:
-    """Weight of what is expected beforehand.
+    """Return the weight of the prior.
 
-    While the model is wrong its error is far above the noise and remembers itself; taking it for white noise would let
-    the constants soak it up. So expectations weigh as much more as the error is larger and longer than noise.
+    While the model is wrong its error is far above the noise and autocorrelated; treated as white noise it would bias
+    the constants. So the prior counts as many times more as the error is larger and longer than noise.
     """
     excess = cost / max(float(np.count_nonzero(problem.weight)), 1.0) - 1.0
     return 1.0 + CORRELATED * max(excess, 0.0)

@@ -12,9 +12,8 @@ from scipy.stats import t as student_t
 
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.gauss_newton import fit
-from tactile_cube.identification.fitting.intervals import NORMAL_95
-from tactile_cube.identification.fitting.problem import Problem
-from tactile_cube.identification.fitting.shooting import Shooting
+from tactile_cube.identification.fitting.problem import Problem, Shooting
+from tactile_cube.identification.fitting.resolution import NORMAL_95
 from tactile_cube.identification.fitting.unknowns import offset_unknowns
 from tactile_cube.measurement.comparing.error import CORRELATED, free_run_error
 from tactile_cube.measurement.recordings.recording import Recording

@@ -11,7 +11,7 @@ from scipy.stats import t as student_t
 
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.identification.criteria import STANDARD, Criteria
-from tactile_cube.identification.fitting.intervals import NORMAL_95, standard_errors
+from tactile_cube.identification.fitting.resolution import NORMAL_95, standard_errors
 from tactile_cube.identification.search.candidates import Candidate, Score, Sizes, first_term
 from tactile_cube.identification.search.evidence import Judgement, worse
 from tactile_cube.identification.search.explanation import (

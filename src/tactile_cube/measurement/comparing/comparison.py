@@ -22,8 +22,7 @@ from tactile_cube.measurement.comparing.regimes import (
     whiteness,
 )
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.model import Model
-from tactile_cube.measurement.replay.nominal import draw_model, nominal_model, require_same_joints
+from tactile_cube.measurement.replay.model import Model, draw_model, nominal_model, require_same_joints
 from tactile_cube.measurement.replay.simulator import Simulated, Simulator, free_run
 
 Array = NDArray[np.float64]

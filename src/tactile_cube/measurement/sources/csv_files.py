@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.model_file import Strict
 from tactile_cube.errors import InputError
-from tactile_cube.measurement.comparing.repeats import lag_between
+from tactile_cube.measurement.comparing.noise_floor import lag_between
 from tactile_cube.measurement.recordings.columns import OF_SOME, SIGNALS, TrialColumns
 from tactile_cube.measurement.recordings.consistency import gains_of
 from tactile_cube.measurement.recordings.description import (

@@ -120,6 +120,6 @@ def recording_tables(settings: Mapping[str, Any], option: str, seed: int) -> dic
             if not isinstance(place, Mapping) or part not in place:
                 break
             place, keys = place[part], [*keys, str(part)]
-        said = "more values" if first["type"] == "missing" else str(first["msg"]).removeprefix("Input should be ")
-        raise InputError(f"{'.'.join(keys)}={place}: expected {said}") from None
+        expected = "more values" if first["type"] == "missing" else str(first["msg"]).removeprefix("Input should be ")
+        raise InputError(f"{'.'.join(keys)}={place}: expected {expected}") from None
     return checked.recordings(seed)
