@@ -136,7 +136,7 @@ def _require_known(part: Mapping[str, Any], place: str, label: str) -> None:
         raise InputError(f"{label}: its configuration names {target[:60]!r}, which is no part of an environment")
     takes = inspect.signature(getattr(import_module(package), name)).parameters
     for key in part.keys() & takes.keys():
-        kinds = str(takes[key].annotation).split(" | ")
+        kinds = inspect.formatannotation(takes[key].annotation).strip("'").split(" | ")
         value = part[key]
         kinds_known = KINDS.keys() >= set(kinds)
         wrong_flag = isinstance(value, bool) and "bool" not in kinds  # True and False are no numbers
