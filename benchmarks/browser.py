@@ -49,12 +49,12 @@ MOVE = """async (moves) => {
 def workbench(*words: str, width: int = 1280) -> Iterator[tuple[Page, psutil.Process, Path]]:
     """A workbench in Chromium: its page, its server, the folder of its run."""
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=shutil.which("chromium"), args=ARGUMENTS)
         command = [sys.executable, "-m", "tactile_cube.workbench", "open=false", f"hydra.run.dir={folder}", *words]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
-            assert server.stdout is not None
-            address = next(found.group() for line in server.stdout if (found := re.search(r"http://\S+", line)))
-            browser = driver.chromium.launch(executable_path=shutil.which("chromium"), args=ARGUMENTS)
             try:
+                assert server.stdout is not None
+                address = next(found.group() for line in server.stdout if (found := re.search(r"http://\S+", line)))
                 page = browser.new_page(viewport={"width": width, "height": 900})
                 page.set_default_timeout(WAIT)
                 page.goto(address)
@@ -90,10 +90,11 @@ def main() -> None:
                 f"server {server.memory_info().rss / 2**20:.0f} MiB, page {heap:.0f} MiB",
                 flush=True,
             )
-        before = processor_seconds(server)
+        start, before = time.monotonic(), processor_seconds(server)
         page.get_by_role("button", name="Refit", exact=True).click()
         page.get_by_role("cell", name="refitted", exact=True).nth(1).wait_for()
-        print(f"refitted and judged: {processor_seconds(server) - before:.1f} s of the server's processor")
+        clock, took = time.monotonic() - start, processor_seconds(server) - before
+        print(f"refitted, judged and drawn: {clock:.1f} s, {took:.1f} s of the server's processor")
 
 
 if __name__ == "__main__":

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from tactile_cube.agent.policy_file import load_actor
 from tactile_cube.api.job import worded_job
-from tactile_cube.evaluation.environment import environment
-from tactile_cube.evaluation.policies import find_policy
+from tactile_cube.evaluation.policies import environment, find_policy
 from tactile_cube.evaluation.policy_path import SHIPPED, policy_path
 from tactile_cube.transforms import EnvConfig, make_env
 

@@ -1,11 +1,11 @@
-"""From bare logs of a real machine to a named effect by clicks, in Chromium: actions, processor time, pictures.
+"""From bare logs of a real machine to a named effect, in Chromium: clicks and keys, processor time, pictures.
 
     python -m benchmarks.walk ../shared/data/sts3215 docs/images
     python -m benchmarks.walk ../shared/data/pendulum_torque
 
 The first line makes the pictures of docs/workbench.md: a Feetech STS3215 under firmware gain 16 with 0.97 kg at 0.1 m,
 six runs of time, goal and position (kscalelabs/sysid; not committed). The second line takes a pendulum
-under torques (lvjonok/mujoco-sysid). An action is a click, or a field typed or chosen. Needs Playwright and Chromium.
+under torques (lvjonok/mujoco-sysid). A choice is two clicks, a text one and its keys. Needs Playwright and Chromium.
 """
 
 import argparse
@@ -54,9 +54,9 @@ def _csv(columns: dict[str, np.ndarray], start: str, names: tuple[str, ...]) -> 
 
 
 class Walk:
-    """Somebody at the page, whose actions are counted."""
+    """Somebody at the page, whose clicks and keys are counted."""
 
-    def __init__(self, page: Page, out: Path | None) -> None:
+    def __init__(self, page: Page, out: Path | None = None) -> None:
         self.page, self.out, self.actions = page, out, 0
 
     def drop(self, logs: Logs) -> None:
@@ -72,12 +72,12 @@ class Walk:
     def choose(self, label: str, option: str) -> None:
         """A value of a select."""
         self.page.get_by_label(label, exact=True).select_option(option)
-        self.actions += 1
+        self.actions += 2
 
     def type(self, label: str, text: str) -> None:
         """A text into a field."""
         self.page.get_by_label(label).fill(text)
-        self.actions += 1
+        self.actions += 1 + len(text)
 
     def picture(self, name: str, height: float, heading: str = "", half: bool = False) -> None:
         """The window from a heading on, or the right half of it, in few colours."""
@@ -103,7 +103,8 @@ def main() -> None:
         walk = Walk(page, args.pictures)
 
         def say(what: str) -> None:
-            print(f"{what}: {walk.actions} actions, {processor_seconds(server):.0f} s of the processor", flush=True)
+            took = processor_seconds(server)
+            print(f"{what}: {walk.actions} clicks and keys, {took:.0f} s of the processor", flush=True)
 
         walk.drop(servo(args.data) if of_servo else pendulum(args.data))
         page.get_by_text("still needed").wait_for()

@@ -72,6 +72,13 @@ def test_a_command_leaves_the_environment_of_later_programs_as_it_was(monkeypatc
         ("diagnose", ["recordng=rec"], "recordng: no such setting; did you mean recording?"),
         ("record", ["source=csv", "source.controller.ki=5"], "source.controller.ki: no such setting; did you mean"),
         ("record", ["source=csv", "source.xyzzy=5"], "source.xyzzy: no such setting; --help lists them"),
+        ("diagnose", ["recording=a", "effects=my.Drag"], "effects=my.Drag: expected a list of names: 'effects=[NAME@"),
+        ("identify", ["recording=a", "effects=[1]"], "effects=[1]: expected a list of names"),
+        (
+            "identify",
+            ["effects=[backlash(play)@a]"],
+            "no viable alternative at input '[backlash(play)@': quote what",
+        ),
         ("diagnose", [], "give either recording=FOLDER (of a recording.yaml) or logs to import: source=csv"),
     ],
 )

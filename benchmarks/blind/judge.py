@@ -2,16 +2,16 @@
 
     python -m benchmarks.blind.judge --draws 60 --out outputs/blind --jobs 1
 
-Every draw adds one line to verdicts.jsonl as soon as it is judged; the same command goes on where it stopped, and
-`--draws 0` only sums up what is there. identification.md, .json and .png (the confusion matrix) beside it sum the
-lines up. What counts as right stands in scoring.py. A round
-to be published runs on a clean commit, with seeds that no round before it used; its line in docs/results/rounds.md is
-printed at the end.
+Every draw adds one line to verdicts.jsonl as soon as it is judged; the same command goes on where it stopped.
+`--draws 0` only sums up what is there, in identification.json beside it. What counts as right stands in scoring.py.
+A round to be published runs on a clean commit, with seeds that no round before it used; its line in
+docs/results/rounds.md is printed at the end.
 """
 
 import argparse
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -23,9 +23,11 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.blind.generator import WORLDS, play, write
-from benchmarks.blind.page import FIRST_SEED, GOAL, markdown, picture, round_row
 from benchmarks.blind.scoring import pushes_found, score
 from tactile_cube.api.diagnosis import each
+
+FIRST_SEED = 10_000
+GOAL = 1.3  # error on unseen trials over the noise floor that is aimed at
 
 
 def commit() -> str:
@@ -191,16 +193,27 @@ def read_lines(path: Path) -> list[dict[str, Any]]:
 
 
 def report(folder: Path, command: str) -> dict[str, Any]:
-    """Write identification.md and identification.json from the lines so far; returns the summary."""
+    """Write identification.json from the lines so far; returns the summary."""
     lines = [judged(x) for x in read_lines(folder / "verdicts.jsonl")]
     summary = summarise(lines)
-    (folder / "identification.md").write_text(markdown(lines, summary, command))
-    if lines:
-        picture(summary, folder / "identification.png")
     (folder / "identification.json").write_text(
         json.dumps({"command": command, **summary, "draws_judged": lines}, indent=1)
     )
     return summary
+
+
+def round_row(summary: dict[str, Any], command: str) -> str:
+    """The round's line in docs/results/rounds.md, but for remarks on how it ended."""
+    options = dict(re.findall(r"(--\S+) (\S+)", command))
+    first = options.pop("--first-seed", str(FIRST_SEED))
+    outcomes = ", ".join(str(summary[key]) for key in ("right", "acceptable", "wrong"))
+    cells = [
+        ", ".join([first, options.pop("--draws"), *options.values()]),
+        ", ".join(f"`{one}`" for one in summary["commits"]),
+        f"{outcomes} ({summary['confidently_wrong']})",
+        "{} of {}".format(*summary["false_alarms"]),
+    ]
+    return f"| {' | '.join(cells)} | ... |"
 
 
 def main() -> None:

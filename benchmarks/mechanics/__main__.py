@@ -13,9 +13,9 @@ import sys
 from pathlib import Path
 
 from benchmarks.mechanics import CASES
+from benchmarks.mechanics.case import ACCURACY, measure
 from benchmarks.mechanics.page import mechanics_page
 from benchmarks.mechanics.refinement import refine
-from benchmarks.mechanics.settings import ACCURACY, measure
 from tactile_cube.agent.policy_file import current_commit
 from tactile_cube.simulation import SimulationOptions
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from benchmarks.mechanics.case import Setting
 from benchmarks.mechanics.refinement import Refinement
-from benchmarks.mechanics.settings import Setting
 
 _EXPLAINED = """What is expected follows from the normal forces that the simulation itself reports, so each figure
 judges the law of contact and not the squeeze. The slip is read off a growing weight, to some 3 %. The cases

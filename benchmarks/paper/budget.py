@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 import tactile_cube
 from tactile_cube.agent.policy_file import current_commit
-from tactile_cube.env.cube_pose import CubePose, cube_pose
+from tactile_cube.env.task import CubePose, cube_pose
 from tactile_cube.evaluation.episode_record import EpisodeRecord
 
 Array = NDArray[np.float64]

@@ -33,7 +33,7 @@ from benchmarks.real_machines.tx40 import Tx40
 from tactile_cube.drivetrain.model_file import read_model
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.writing import write_recording
-from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.model import nominal_model
 from tactile_cube.measurement.sources.source import Source
 
 KEY = Path(__file__).parent / "key.yaml"

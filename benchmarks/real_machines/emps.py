@@ -11,8 +11,7 @@ import numpy as np
 from tactile_cube.measurement.recordings.description import TrialEntry
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable, cut_trial
-from tactile_cube.measurement.replay.model import Model
-from tactile_cube.measurement.replay.nominal import no_offsets
+from tactile_cube.measurement.replay.model import Model, no_offsets
 from tactile_cube.measurement.replay.simulator import Simulator
 from tactile_cube.measurement.replay.windows import whole_trials
 from tactile_cube.measurement.sources.source import described

@@ -26,8 +26,7 @@ from benchmarks.servos.sts3215 import sts3215
 from benchmarks.servos.xl330 import xl330
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.writing import write_recording
-from tactile_cube.measurement.replay.model import Model
-from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.model import Model, nominal_model
 from tactile_cube.measurement.replay.simulator import free_run
 
 SERVOS: dict[str, Callable[[Path], Servo]] = {

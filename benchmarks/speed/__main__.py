@@ -2,7 +2,7 @@
 
     python -m benchmarks.speed [environment update ...] [--rounds 7] [--no-peers] [--out outputs/speed]
 
-Prints each section as it is done and writes benchmark.json, .md and .png after each. Peers are naive PyBullet, MuJoCo
+Prints each section as it is done and writes benchmark.json and .md after each. Peers are naive PyBullet, MuJoCo
 and Stable-Baselines3: pip install 'tactile-cube[benchmark]'.
 """
 
@@ -26,11 +26,9 @@ SECTIONS: dict[str, Callable[[int, bool], Section]] = {
     "environment": lambda rounds, peers: _function("environment")(rounds, peers),
     "accuracy": lambda rounds, peers: _function("accuracy")(),
     "update": lambda rounds, peers: _function("update")(rounds, peers),
-    "collector": lambda rounds, peers: _function("collector")(rounds),
     "end_to_end": lambda rounds, peers: _function("end_to_end")(min(rounds, 5), peers),
     "identification": lambda rounds, peers: _function("identification")(rounds, peers),
     "startup": lambda rounds, peers: _function("startup")(rounds),
-    "workbench": lambda rounds, peers: _function("workbench")(rounds),
 }
 
 
@@ -71,9 +69,8 @@ def main() -> None:
     given = asked()
     os.environ.setdefault("OMP_NUM_THREADS", "1")  # one core against one core; torch reads it when it is imported
 
-    from benchmarks.speed.machine import busy, machine
-    from benchmarks.speed.picture import write_picture
-    from benchmarks.speed.table import table
+    from benchmarks.speed.report import table
+    from benchmarks.speed.timing import busy, machine
     from tactile_cube.agent.policy_file import current_commit
 
     command = shlex.join(["python", "-m", "benchmarks.speed", *sys.argv[1:]])
@@ -94,8 +91,7 @@ def main() -> None:
         (given.out / "benchmark.md").write_text(page, encoding="utf-8")
         found = {"machine": facts, "sections": [section.plain() for section in done]}
         (given.out / "benchmark.json").write_text(json.dumps(found, indent=1), encoding="utf-8")
-        write_picture(done, given.out / "benchmark.png")
-    print(f"results: {given.out / 'benchmark.json'}\npicture: {given.out / 'benchmark.png'}")
+    print(f"results: {given.out / 'benchmark.json'}")
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from types import ModuleType
@@ -14,15 +15,16 @@ import numpy as np
 from benchmarks.speed.peers import find_peer
 from benchmarks.speed.report import Figure, Section
 from benchmarks.speed.sb3_sac import learning_sac
-from benchmarks.speed.the_task import table_config, table_environment
 from benchmarks.speed.timing import Timing, in_turns
 from tactile_cube.agent.agent import Agent
 from tactile_cube.agent.plain_sac import PlainSac
 from tactile_cube.agent.sac import Sac
 from tactile_cube.gymnasium_env import GymnasiumRotation
-from tactile_cube.training.build import Environment, build_run
+from tactile_cube.simulation.engine import EngineName
+from tactile_cube.training.build import Environment, build_run, rotation_environment
 from tactile_cube.training.run import Run
 from tactile_cube.training.settings import CollectorSettings, TrainingSettings
+from tactile_cube.transforms import EnvConfig
 
 WORLDS, STEPS, UPDATES, HIDDEN = 12, 25, 100, 512
 YARDSTICK = "Stable-Baselines3 SAC"
@@ -124,3 +126,23 @@ def _figures(timings: dict[str, Timing], simulating: dict[str, float], frames: i
         ratio = None if base_cpu is None else float(base_cpu / frames * 1000.0 / median)
         figures.append(Figure(name, median, low, high, "core-seconds / 1000 steps", ratio))
     return figures
+
+
+def table_config() -> EnvConfig:
+    """The configuration of the experiment, composed as on the command line."""
+    from hydra import compose, initialize_config_dir
+    from hydra.core.global_hydra import GlobalHydra
+    from hydra.utils import instantiate
+
+    from tactile_cube.composition import CONFIG
+
+    GlobalHydra.instance().clear()  # of the command that runs this, which has its configuration already
+    with initialize_config_dir(str(CONFIG.resolve()), version_base="1.3"):
+        config: EnvConfig = instantiate(compose("train", overrides=["+experiment=table"]).env)
+    return config
+
+
+def table_environment(engine: EngineName = "bullet") -> Environment:
+    """The same, as training takes it."""
+    config = table_config()
+    return rotation_environment(replace(config, simulation=replace(config.simulation, engine=engine)))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tactile_cube.identification.fitting.unknowns import TOLERANCE
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
-from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.model import nominal_model
 
 Array = NDArray[np.float64]
 

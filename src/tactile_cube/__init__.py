@@ -10,14 +10,11 @@ from __future__ import annotations
 
 import importlib
 import sys
-from importlib.abc import InspectLoader, MetaPathFinder
-from importlib.machinery import ModuleSpec
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
 
-from tactile_cube.composition import CONFIG
 from tactile_cube.errors import InputError
 
 if TYPE_CHECKING:
@@ -78,20 +75,6 @@ class _Package(ModuleType):
             super().__setattr__(name, value)
 
 
-class _Commands(MetaPathFinder, InspectLoader):
-    """Gives each command of conf/ a module, for `python -m tactile_cube.train`."""
-
-    def find_spec(self, fullname: str, path: Any = None, target: ModuleType | None = None) -> ModuleSpec | None:
-        package, _, name = fullname.rpartition(".")
-        known = package == __name__ and (CONFIG / f"{name}.yaml").is_file()
-        return ModuleSpec(fullname, self, origin="command") if known else None
-
-    def get_source(self, fullname: str) -> str:
-        made = f"from tactile_cube.cli import command_line\nmain = command_line({fullname.rpartition('.')[2]!r})\n"
-        return f"{made}if __name__ == '__main__':\n    main()\n"
-
-
-sys.meta_path.append(_Commands())
 sys.modules[__name__].__class__ = _Package
 
 # Gymnasium 1 loads no entry points of other packages

@@ -158,9 +158,8 @@ def suggestion(word: str, known: Iterable[str], prefix: str = "") -> str:
 def meaning(key: str) -> str:
     """Return what the configuration says in brackets of a key that must be set, or nothing."""
     line = re.compile(rf"^ *{re.escape(key.rpartition('.')[2])}: \?\?\? *# *(.*)$", re.MULTILINE)
-    files = sorted(CONFIG.rglob("*.yaml"), key=lambda path: len(path.parts))
-    found = next((match for file in files if (match := line.search(file.read_text(encoding="utf-8")))), None)
-    return f" ({found[1]})" if found else ""
+    found = [match[1] for file in CONFIG.rglob("*.yaml") for match in line.finditer(file.read_text(encoding="utf-8"))]
+    return f" ({min(found, key=len)})" if found else ""
 
 
 def near_key(name: str) -> str:

@@ -39,7 +39,7 @@ class GymnasiumRotation(gymnasium.Env[Observation, Observation]):
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012 - Gymnasium's own declaration
 
     def __init__(self, config: EnvConfig, render_mode: str | None = None, judged: bool = True) -> None:
-        """Builds the world; with `judged` episodes are recorded for "is_success".
+        """Build the world; with `judged` episodes are recorded for "is_success".
 
         Raises:
             InputError: another render mode than "rgb_array", or None for no pictures.
@@ -59,7 +59,7 @@ class GymnasiumRotation(gymnasium.Env[Observation, Observation]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Starts the next episode; with a `seed`, the first of a new sequence, which else begins at random."""
+        """Start the next episode; with a `seed`, the first of a new sequence, which else begins at random."""
         super().reset(seed=seed)
         if seed is None and not self._seeded:
             seed = int(self.np_random.integers(2**31))

@@ -31,7 +31,7 @@ def usage_error(error: BaseException) -> str | None:
             where = cause.filename or "output"
             return f"{where}: the disk is full; free some of it, or write elsewhere with hydra.run.dir=DIR"
         if isinstance(cause, OSError) and cause.errno in DENIED and cause.filename:
-            return f"{cause.filename}: {cause.strerror}; choose another place with hydra.run.dir=DIR"
+            return f"{cause.filename}: {cause.strerror}; choose another place"
         frames = traceback.extract_tb(cause.__traceback__)
         if isinstance(cause, TypeError | ValueError) and frames and frames[-1].filename.endswith(CHOOSING):
             return f"a choice from a group of conf/ is the name of a file there, e.g. task=table: {_flat(cause)}"
@@ -48,7 +48,7 @@ def _causes(error: BaseException | None) -> Iterator[BaseException]:
 
 
 def _one_line(error: BaseException) -> str:
-    from hydra.errors import InstantiationException, MissingConfigException
+    from hydra.errors import InstantiationException, MissingConfigException, OverrideParseException
     from omegaconf.errors import MissingMandatoryValue, OmegaConfBaseException
     from pydantic import ValidationError
 
@@ -56,6 +56,9 @@ def _one_line(error: BaseException) -> str:
     if key := re.match(r"Could not override '([^']+)'.\s*To append to your config", str(error)):
         asked = max(key[1], str(getattr(cause, "full_key", "")), key=len)
         return f"{asked}: no such setting{near_key(asked) or '; --help lists them'}"
+    if isinstance(error, OverrideParseException):
+        said = _flat(error).partition(" See http")[0]
+        return f"{said}: quote what has brackets, colons or blanks, 'effects=[\"backlash@q2: play=0.05\"]'"
     if isinstance(error, MissingMandatoryValue):
         return f"{error.full_key}=... is missing{meaning(str(error.full_key))}"
     if isinstance(error, ValidationError):

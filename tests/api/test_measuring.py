@@ -11,6 +11,7 @@ import tactile_cube
 from tactile_cube import InputError, TrialArrays
 from tactile_cube.api.comparison import opened
 from tactile_cube.api.job import worded_job
+from tactile_cube.drivetrain.model_file import ModelFile
 from tests.measurement.small_rig import URDF, setting, table, write
 
 RIG = {"source.duration": 4, "source.initialisations": 2, "source.kinds": ["ramps", "multisine"]}
@@ -97,6 +98,29 @@ def test_what_arrays_lack_is_told_in_one_line(change: dict[str, Any], message: s
 def test_a_step_or_a_seed_that_is_none_is_refused(word: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
         worded_job("compare", ["recording=x", word])
+
+
+def test_a_name_that_stands_twice_and_a_band_of_no_size_are_told_at_once(tmp_path: Path) -> None:
+    folder = write(tmp_path)
+    with pytest.raises(InputError, match="effects: 'viscous_friction@a' is named twice"):
+        tactile_cube.identify(folder, ["viscous_friction", "viscous_friction(difference)@a"], say=quiet)
+    with pytest.raises(InputError, match=r"band\.simulations=-3: Input should be greater than or equal to 0"):
+        tactile_cube.compare(folder, values={"band.simulations": -3})
+    with pytest.raises(InputError, match=r"band\.spread\.kp=x: Input should be a valid number"):
+        tactile_cube.compare(folder, values={"band.spread.kp": "x"})
+
+
+def test_a_model_is_compared_at_another_gain_of_the_firmware(tmp_path: Path) -> None:
+    def at(kp: float, gain: float | None = None) -> float:
+        model = ModelFile.model_validate({"joints": ["a", "b"], "values": {"kp": {"a": kp, "b": kp}}})
+        return tactile_cube.compare(folder, model=model, gain=gain, values={"band.simulations": 0}).error
+
+    folder = write(tmp_path)
+    assert at(1.5, 2.0) == at(3.0) != at(1.5)
+    with pytest.raises(InputError, match=r"gain=0\.0: give the P gain over that at which"):
+        at(3.0, 0.0)
+    with pytest.raises(InputError, match=r"gain=2: give model=model\.yaml with a kp"):
+        tactile_cube.compare(folder, gain=2)
 
 
 def test_an_effect_that_cannot_act_at_its_joint_is_told(tmp_path: Path) -> None:

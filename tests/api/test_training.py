@@ -9,7 +9,7 @@ import torch
 from omegaconf import OmegaConf
 
 import tactile_cube
-from benchmarks.paper.ancestry import read_ancestry
+from benchmarks.paper.model_card import read_ancestry
 from tactile_cube import InputError
 from tactile_cube.agent.networks import Actor, Sizes
 from tactile_cube.agent.policy_file import PolicyInfo, load_actor, save_policy

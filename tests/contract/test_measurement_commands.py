@@ -66,21 +66,25 @@ ARM = """<robot name="arm"><link name="base"/><link name="upper"><inertial><orig
 <inertia ixx="1e-4" iyy="1.6e-2" izz="1.6e-2" ixy="0" ixz="0" iyz="0"/></inertial></link><joint name="shoulder_pan"
 type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 0 1"/><limit lower="-2" upper="2" effort="5"
 velocity="9"/></joint></robot>"""
-KP, KD, INERTIA, DELAY, FPS = 6.0, 0.6, 0.02, 0.06, 30
+KP, KD, INERTIA, DELAY, LIMIT, FPS = 6.0, 0.6, 0.02, 0.06, 3.0, 30
 
 
-def lerobot_set(folder: Path) -> None:
-    """Episodes that are cut out of a motion, of J dv = KP (q_d(t - DELAY) - q) - KD v; position is read, then sent."""
+def lerobot_set(folder: Path, delay: float = 0.0, limit: float = np.inf) -> None:
+    """Episodes that are cut out of a motion, of J dv = KP (g(t - delay) - q) - KD v; position is read, then sent.
+
+    g follows the goal by up to `limit` [rad/s].
+    """
     rng, steps = np.random.default_rng(0), 100
     rows = []
     for episode in range(4):
         corners = np.cumsum(np.concatenate([[0.0], rng.uniform(0.2, 0.7, 40)]))
         command = np.interp(np.arange(12 * FPS) / FPS, corners, rng.uniform(-1.0, 1.0, 41))
-        held = np.concatenate([np.full(round(DELAY * FPS * steps), command[0]), np.repeat(command, steps)])
-        q, v, position = command[0], 0.0, np.zeros(len(command))
+        held = np.concatenate([np.full(round(delay * FPS * steps), command[0]), np.repeat(command, steps)])
+        q, g, v, position = command[0], command[0], 0.0, np.zeros(len(command))
         for k in range(len(command) * steps):
             position[k // steps] = q if k % steps == 0 else position[k // steps]
-            v += (KP * (held[k] - q) - KD * v) / INERTIA / FPS / steps
+            g += np.clip(held[k] - g, -limit / FPS / steps, limit / FPS / steps)
+            v += (KP * (g - q) - KD * v) / INERTIA / FPS / steps
             q += v / FPS / steps
         read = np.round(position * 4096 / (2 * np.pi)) * 360 / 4096
         for k in range(2 * FPS, len(command)):
@@ -94,8 +98,14 @@ def lerobot_set(folder: Path) -> None:
     polars.DataFrame(rows, schema=names, orient="row").write_parquet(folder / "data/chunk-000/file-000.parquet")
 
 
-def test_from_a_lerobot_data_set_to_a_named_effect_by_one_command(tmp_path: Path) -> None:
-    lerobot_set(tmp_path / "set")
+@pytest.mark.parametrize(
+    ("hidden", "named", "within"),
+    [({"delay": DELAY}, "command_delay", 0.002), ({"limit": LIMIT}, "rate_limit", 0.02)],
+)
+def test_from_a_lerobot_data_set_to_a_named_effect_by_one_command(
+    hidden: dict[str, float], named: str, within: float, tmp_path: Path
+) -> None:
+    lerobot_set(tmp_path / "set", **hidden)
     (tmp_path / "arm.urdf").write_text(ARM)
     words = ["source=csv", "source.files=set", "source.urdf=arm.urdf", "source.angle_unit=deg", "hydra.run.dir=run"]
     words += [f"source.controller.kp={KP}", f"source.controller.kd={KD}"]
@@ -104,8 +114,9 @@ def test_from_a_lerobot_data_set_to_a_named_effect_by_one_command(tmp_path: Path
     assert "one where 'episode_index' changes" in asked.stdout
     assert "of 4 trials; their first 0.4 s count in no error" in asked.stdout
     (effect,) = read_model(tmp_path / "run" / "model.yaml").effects
-    assert effect.effect == "command_delay@shoulder_pan"
-    assert effect.parameters["delay"].value == pytest.approx(DELAY, abs=0.002)
+    assert effect.effect == f"{named}@shoulder_pan"
+    (found,) = effect.parameters.values()
+    assert found.value == pytest.approx(*hidden.values(), abs=within)
     assert read_model(tmp_path / "run" / "model.yaml").provenance.recording.endswith("run/recording")
 
 

@@ -14,8 +14,7 @@ import tactile_cube
 from tactile_cube.api.job import as_word, called_job, settings_of
 from tactile_cube.composition import composed
 from tactile_cube.env import Conditions
-from tactile_cube.evaluation.environment import environment
-from tactile_cube.evaluation.policies import find_policy
+from tactile_cube.evaluation.policies import environment, find_policy
 from tactile_cube.training.build import as_environment
 from tactile_cube.transforms import make_env
 

@@ -317,7 +317,7 @@ ALLOWED = {
     "whole_file.py": "the one place",
     "training/loggers.py": "metrics.csv grows line by line; a line that was cut is dropped when the run goes on",
     "run_folder.py": "what the console showed, line by line",
-    "deployment/loop_log.py": "grows while a hand is driven, so that a crash leaves what was logged",
+    "deployment/run_loop.py": "grows while a hand is driven, so that a crash leaves what was logged",
     "sweep.py": "a line for each job, deleted at the end of the sweep",
     "drivetrain/kernel.py": "a cache that several processes write at once, each aside and renamed",
 }

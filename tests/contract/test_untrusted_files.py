@@ -23,8 +23,7 @@ from tactile_cube.composition import composed
 from tactile_cube.deployment.training_setting import training_setting
 from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.errors import InputError
-from tactile_cube.evaluation.environment import environment
-from tactile_cube.evaluation.policies import HoldPolicy, PolicySource
+from tactile_cube.evaluation.policies import HoldPolicy, PolicySource, environment
 from tactile_cube.training.checkpoint import FILE, HEAD
 from tests.own_hands import description
 
@@ -51,7 +50,7 @@ EVIL: dict[str, tuple[dict[str, Any], str]] = {
     "a part as text": ({"constants": f"{{object: {OPEN}}}"}, "valid dictionary"),
     "the target as a list": ({"task": {"_target_": ["builtins.open"], "file": MARK}}, FOREIGN),
     "a module's module": ({"task": {"_target_": "tactile_cube.cli.os.mkdir", "path": MARK}}, FOREIGN),
-    "a function of a listed package": ({"task": {"_target_": "tactile_cube.env.cube_pose"}}, FOREIGN),
+    "a function of a listed package": ({"task": {"_target_": "tactile_cube.env.task"}}, FOREIGN),
     "an unlisted part of a listed package": ({"task": {"_target_": "tactile_cube.simulation.World"}}, FOREIGN),
     "arguments by place": ({"task": {"_target_": "tactile_cube.env.Task", "_args_": ["full"]}}, "no setting"),
     "a function half called": ({"task": {"_target_": "tactile_cube.env.Task", "_partial_": True}}, "no setting"),

@@ -11,9 +11,8 @@ import numpy as np
 
 from tactile_cube.deployment.command_guard import StopError
 from tactile_cube.deployment.control_loop import ControlLoop, Mode
-from tactile_cube.deployment.loop_log import LoopLog
 from tactile_cube.deployment.robot import JointLimits, Reading, StopRules
-from tactile_cube.deployment.run_loop import LoopRun, run_loop
+from tactile_cube.deployment.run_loop import LoopLog, LoopRun, run_loop
 
 TICK = 1e-3  # [s]
 SMALL = 1e-9

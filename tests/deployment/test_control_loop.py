@@ -15,9 +15,8 @@ from numpy.lib import format as npy
 from tactile_cube.deployment.command_guard import CommandGuard
 from tactile_cube.deployment.control_loop import ControlLoop, Homing, Mode
 from tactile_cube.deployment.controller import PlayedTargets
-from tactile_cube.deployment.loop_log import CHUNK, LoopLog, write_runs
 from tactile_cube.deployment.robot import JointLimits, Reading, StopRules, Watchdog
-from tactile_cube.deployment.run_loop import LoopRun
+from tactile_cube.deployment.run_loop import CHUNK, LoopLog, LoopRun, write_runs
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2
 from tactile_cube.measurement.recordings import writing

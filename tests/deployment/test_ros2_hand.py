@@ -13,10 +13,9 @@ import pytest
 from tactile_cube.deployment.command_guard import REPEATS
 from tactile_cube.deployment.control_loop import ControlLoop, Homing
 from tactile_cube.deployment.controller import PlayedTargets
-from tactile_cube.deployment.loop_log import LoopLog
 from tactile_cube.deployment.robot import JointLimits, StopRules
 from tactile_cube.deployment.ros2_hand import Ros2Hand
-from tactile_cube.deployment.run_loop import LoopRun, run_loop
+from tactile_cube.deployment.run_loop import LoopLog, LoopRun, run_loop
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2
 from tests.deployment.fake_rclpy import Empty, JointState, Node, Stamp, node

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tactile_cube.env import Task, cube_pose
-from tactile_cube.env.cube_pose import frame_along, seen_along
+from tactile_cube.env.task import frame_along, seen_along
 from tactile_cube.errors import InputError
 
 

@@ -4,8 +4,7 @@ from omegaconf import OmegaConf
 from tactile_cube.api.job import worded_job
 from tactile_cube.composition import CONFIG, composed
 from tactile_cube.errors import InputError
-from tactile_cube.evaluation.environment import environment, worlds
-from tactile_cube.evaluation.policies import HoldPolicy, PolicySource, find_policy
+from tactile_cube.evaluation.policies import HoldPolicy, PolicySource, environment, find_policy, worlds
 from tactile_cube.randomization import StartStates
 
 EXPERIMENTS = sorted(file.stem for file in (CONFIG / "experiment").glob("*.yaml"))

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.identification.fitting.gauss_newton import Fit
-from tactile_cube.identification.fitting.shooting import Shooting
+from tactile_cube.identification.fitting.problem import Shooting
 from tactile_cube.identification.search.search import Search
 from tactile_cube.measurement.comparing.noise_floor import sensor_noise
 from tactile_cube.measurement.recordings.recording import Recording

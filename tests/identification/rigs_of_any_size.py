@@ -9,11 +9,10 @@ import polars
 import yaml
 
 from tactile_cube.drivetrain.effects import Effect, find_effect
-from tactile_cube.identification.fitting.shooting import Shooting
+from tactile_cube.identification.fitting.problem import Shooting
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.model import Model, Term
-from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.model import Model, Term, nominal_model
 from tactile_cube.measurement.replay.windows import cut
 
 URDF = """<robot name="single"><link name="base"/><link name="arm"><inertial><origin xyz="0 0 {com:.12g}"/>

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tactile_cube.drivetrain.effects import catalogue, find_effect
-from tactile_cube.drivetrain.effects.scales import FINGER
+from tactile_cube.drivetrain.effects.effect import FINGER
 from tactile_cube.identification.diagnosis import Unseen, no_worse, unseen
 from tactile_cube.identification.in_words import unseen_effects
 from tactile_cube.identification.search.search import Search

@@ -11,7 +11,7 @@ from tactile_cube.identification.disturbances import Disturbance, disturbances, 
 from tactile_cube.identification.search.search import Search
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.model import nominal_model
 from tactile_cube.measurement.replay.simulator import free_run
 from tests.identification.rigs_of_any_size import EFFECTS, SAMPLES, STEP, Size, simulated
 from tests.measurement.small_rig import write

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tactile_cube.drivetrain.effects import find_effect
-from tactile_cube.drivetrain.effects.scales import FINGER
+from tactile_cube.drivetrain.effects.effect import FINGER
 from tactile_cube.errors import InputError
 from tactile_cube.identification import identification
 from tactile_cube.identification.identification import identify_effects, with_effect

@@ -38,9 +38,7 @@ def test_what_is_left_stands_in_the_headline() -> None:
 
 def test_an_unstable_machine_is_told_by_short_windows() -> None:
     unstable = result("missing_effect") | {"error_over_noise": {"with_effects": 1.05}}
-    assert (
-        left_over(unstable) == " (1.05 sensor noises remain in short windows; run freely, the model parts by 4.3 mrad)"
-    )
+    assert left_over(unstable) == " (1.05 sensor noises remain in short windows; in a free run it deviates by 4.3 mrad)"
 
 
 def test_the_error_over_noise_is_stated_as_the_workbench_states_it_and_degrees_stay_degrees() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 
 from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.identification.criteria import STANDARD
-from tactile_cube.identification.inquiry import Inquiry, beside_disturbances
+from tactile_cube.identification.diagnosis import Inquiry, beside_disturbances
 from tactile_cube.identification.search.explanation import named_by
 from tests.identification.rigs_of_any_size import STEP, Size, simulated
 

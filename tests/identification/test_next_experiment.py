@@ -9,7 +9,7 @@ import polars as pl
 from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.identification.diagnosis import UNPROVEN, Diagnosis, open_fits
 from tactile_cube.identification.diagnosis_json import safety_as_json
-from tactile_cube.identification.fitting.intervals import Fitted
+from tactile_cube.identification.fitting.resolution import Fitted
 from tactile_cube.identification.next_experiment import Experiment, next_experiment
 from tactile_cube.identification.safe_commands import FASTEST, excitations
 from tactile_cube.identification.standard_model import StandardModel

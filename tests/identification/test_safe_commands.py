@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tactile_cube.identification.fitting.gauss_newton import Fit
-from tactile_cube.identification.fitting.shooting import Shooting
+from tactile_cube.identification.fitting.problem import Shooting
 from tactile_cube.identification.in_words import next_steps
 from tactile_cube.identification.next_experiment import next_experiment
 from tactile_cube.identification.safe_commands import (
@@ -27,7 +27,7 @@ from tactile_cube.identification.safe_commands import (
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
-from tactile_cube.measurement.replay.nominal import no_offsets
+from tactile_cube.measurement.replay.model import no_offsets
 from tactile_cube.measurement.replay.simulator import Simulator
 from tests.identification import force_driven_axis
 from tests.identification.fitted_rivals import fitted_rivals

@@ -9,13 +9,13 @@ import pytest
 import yaml
 from numpy.typing import NDArray
 
-from tactile_cube.identification.fitting.shooting import Shooting
+from tactile_cube.identification.fitting.problem import Shooting
 from tactile_cube.identification.search.evidence import HeldOut
 from tactile_cube.identification.standard_model import StandardModel, fit_standard_model, soft_l1
 from tactile_cube.measurement.comparing.noise_floor import noise_with_links, reading_step
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.model import nominal_model
 from tactile_cube.measurement.split import held_out_split
 
 Array = NDArray[np.float64]

@@ -10,7 +10,7 @@ from tactile_cube.identification.criteria import Criteria
 from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.search.candidates import Candidate, forms, term_unknowns
 from tactile_cube.identification.search.evidence import Judgement, gain, worse
-from tactile_cube.identification.search.explanation import Explanation, proven, unproven
+from tactile_cube.identification.search.explanation import Explanation, proven, sound, unproven
 from tactile_cube.identification.search.findings import Findings
 from tactile_cube.identification.verdict import at_bound, decide, unexplained_joints
 from tactile_cube.measurement.replay.model import Model, Term
@@ -187,3 +187,12 @@ def test_an_effect_is_proven_by_its_size_and_its_certainty_and_unproven_if_only_
     assert not proven(replace(found, gain=0.03)), "too little to speak of"
     assert not proven(replace(found, p_value=0.02)), "may be chance"
     assert [unproven(replace(found, p_value=0.02, gain=gain)) for gain in (0.5, 0.2)] == [True, False]
+
+
+def test_a_set_is_refused_to_which_another_adds_what_is_proven() -> None:
+    less, more = explanation("torque_saturation", 10.0), explanation("torque_saturation", 9.0)
+    other = explanation("command_delay", 10.0)
+    more = replace(more, effects=(*more.effects, *explanation("torque_gain", 9.0).effects))
+    assert sound([less, more, other]) == [more, other], "what it adds to is refused, another law is not"
+    useless = replace(more, judgement=judged(10.5))
+    assert sound([less, useless, other]) == [less, other], "as is a set that does no better without one of its effects"

@@ -113,6 +113,11 @@ def test_degrees_within_wide_limits_are_recognised_by_the_torque(tmp_path: Path)
     assert "degrees" in error_of(write(tmp_path, setting({"controller.kd": 1e-9}), spoil, wide))
 
 
+def test_a_gain_57_times_too_large_is_no_angle_in_degrees_for_sure(tmp_path: Path) -> None:
+    message = error_of(write(tmp_path / "gain", setting({"controller.kp": 171.9, "controller.kd": 1e-9})))
+    assert "either controller.kp is 57.3 times too large, or this looks like degrees" in message
+
+
 def test_a_urdf_that_lacks_the_joint_is_named(tmp_path: Path) -> None:
     message = error_of(write(tmp_path, urdf=URDF.replace('name="b"', 'name="c"')))
     assert "'b' is not in" in message

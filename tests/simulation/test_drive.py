@@ -5,8 +5,13 @@ from tactile_cube.drivetrain.effects import CONTACT, Effect, find_effect
 from tactile_cube.hand import DLR_HAND2
 from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.simulation import EpisodeConstants, Start, World
-from tactile_cube.simulation.drive import TENDON_DAMPING, TENDON_STIFFNESS, spin_inertia, spin_shares
-from tactile_cube.simulation.engine import SimulationOptions
+from tactile_cube.simulation.engine import (
+    TENDON_DAMPING,
+    TENDON_STIFFNESS,
+    SimulationOptions,
+    spin_inertia,
+    spin_shares,
+)
 
 NOWHERE = (0.0, 0.0, 3.0)
 

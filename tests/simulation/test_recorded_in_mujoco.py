@@ -14,7 +14,7 @@ import pytest
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.hand_replay import ContactModel, HandReplay
-from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.model import nominal_model
 
 FOLDER = Path(__file__).parent / "recordings" / "mujoco_grasp"
 AS_RECORDED = ContactModel({"spinning_friction": {"radius": 3e-3}})

@@ -143,6 +143,30 @@ def test_a_sliding_joint_is_shown_in_millimetres_and_newtons(tmp_path: Path) -> 
     assert [" mm" in line for line in sorted(one.sentences)] == [True, False]
 
 
+def test_a_log_in_degrees_is_shown_in_degrees_everywhere(comparison: Comparison, tmp_path: Path) -> None:
+    recording, errors = comparison.recording, {"nominal": {"a": 0.007, "b": 0.006}}
+    described = recording.description.model_copy(update={"shown_in": {"a": "deg", "b": "deg"}})
+    in_degrees = replace(recording, description=described)
+    one = compare_recording(in_degrees, comparison.model, floor=comparison.floor)
+    degrees = f"{np.degrees(one.errors.overall):.3g} deg (RMS) away"
+    unknown = DIAGNOSIS | {"verdict": "unknown_effect", "units": recording.units, "error_joints": errors}
+    signal = {"depends_most_on": "position of b [rad]", "beside": "the refitted model"}
+    unknown["unexplained"] = [{"joint": "b", "black_box": 0.93, **signal}]
+    x = np.linspace(-1, 1, 12)
+    shape = Shape("b", "position of b [rad]", x, 0.01 * x, np.full(12, 0.002), 0.83)
+    pages = [
+        comparison_report(one, "cmd", None),
+        diagnosis_report(unknown, one, one, "cmd", "m.yaml", [shape]),
+        identification_report(one, DIAGNOSIS["error"], errors, "cmd", "m.yaml"),
+    ]
+    said = [page(made, tmp_path / "r.html") for made in pages]
+    assert degrees in said[0]
+    assert degrees in summary(one)
+    assert "position of b [deg]" in said[1]
+    assert "fell from 0.401 deg to 0.0344 deg" in said[2]
+    assert [text for text in (*said, summary(one)) if "mrad" in text or "[rad]" in text] == []
+
+
 @pytest.mark.parametrize(
     ("turning", "sliding"),
     [("N m s/rad", "N s/m"), ("N m/rad^3", "N/m^3"), ("kg m^2", "kg"), ("rad/s per N m", "m/s per N"), ("s", "s"),

@@ -7,7 +7,7 @@ from tactile_cube.evaluation.protocol import Variant
 from tactile_cube.evaluation.summary import summarise
 from tactile_cube.evaluation.training_curve import read_curve
 from tactile_cube.evaluation.verdict import judge_episode
-from tactile_cube.visualization.curves import write_learning_curves, write_robustness_map
+from tactile_cube.visualization.charts import write_learning_curves, write_robustness_map
 from tests.evaluation.synthetic import episode
 
 METRICS = (

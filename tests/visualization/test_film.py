@@ -5,7 +5,7 @@ import pytest
 from PIL import Image
 
 from tactile_cube.hand.object_mesh import ObjectShape, read_mesh
-from tactile_cube.visualization.film import MAX_BYTES, write_film
+from tactile_cube.visualization.episode_recording import MAX_BYTES, write_film
 from tactile_cube.visualization.scene import BELOW, SIDE, Scene
 from tests.evaluation.synthetic import episode
 from tests.meshes import CUBE, write_obj

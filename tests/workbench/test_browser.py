@@ -17,11 +17,12 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 import polars
+import psutil
 import pytest
 import yaml
 
 from tactile_cube.drivetrain.model_file import read_model
-from tactile_cube.identification.fitting.intervals import Fitted
+from tactile_cube.identification.fitting.resolution import Fitted
 from tactile_cube.identification.in_words import PARTIAL
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.workbench.background import Found
@@ -29,7 +30,13 @@ from tests.measurement.sources.bare_joint import LEVER, MASS, ROTOR, played
 from tests.workbench.small_bench import STRIBECK, stribeck_recording
 
 pytest.importorskip("bokeh")
-playwright = pytest.importorskip("playwright.sync_api")
+pytest.importorskip("playwright.sync_api")
+
+from playwright import sync_api as playwright
+
+from benchmarks.browser import ARGUMENTS, processor_seconds
+from benchmarks.walk import Walk
+
 CHROMIUM = next(
     (path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None
 )
@@ -43,8 +50,6 @@ GIVEN = {
     "K_P [N m/rad]": "4.0", "K_D [N m s/rad]": "0.2", "torque limit [N m]": "4.0",
     "stiffness, if known": "40", "friction [N m]": "0.02", "rotor inertia [kg m^2]": "0.004",
 }  # fmt: skip
-DROP = """(files) => { const data = new DataTransfer();
-for (const [name, text] of files) data.items.add(new File([text], name)); return data; }"""
 
 
 @pytest.fixture(scope="module")
@@ -53,29 +58,27 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> Recording:
 
 
 @pytest.fixture(scope="module")
-def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path]]:
-    """The address that the command prints, and its folder."""
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path, psutil.Process]]:
+    """The address that the command prints, its folder and its process."""
     folder = tmp_path_factory.mktemp("out") / "run"
     words = [sys.executable, "-m", "tactile_cube.workbench", "open=false", f"hydra.run.dir={folder}"]
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         address = next(found.group() for line in process.stdout if (found := re.search(r"http://\S+", line)))
-        yield address, folder
+        yield address, folder, psutil.Process(process.pid)
         process.terminate()
 
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
     with playwright.sync_playwright() as driver:
-        started = driver.chromium.launch(
-            executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
-        )
+        started = driver.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
         yield started
         started.close()
 
 
 @pytest.fixture
-def window(browser: Any, served: tuple[str, Path]) -> Iterator[Any]:
+def window(browser: Any, served: tuple[str, Path, psutil.Process]) -> Iterator[Any]:
     """A window in which nothing fails and that asks no other machine for anything."""
     page = browser.new_page(viewport={"width": 1280, "height": 900})
     page.set_default_timeout(PATIENCE)
@@ -94,14 +97,15 @@ def window(browser: Any, served: tuple[str, Path]) -> Iterator[Any]:
 
 
 def picture(window: Any, name: str) -> None:
-    if PICTURES:
+    """Keep a picture of a step, narrow and wide."""
+    for width in (800, 1280) if PICTURES else ():
+        window.set_viewport_size({"width": width, "height": 900})
         window.wait_for_timeout(500)
-        window.screenshot(path=f"{PICTURES}/{name}.png", full_page=True)
+        window.screenshot(path=f"{PICTURES}/{name}_{width}.png", full_page=True)
 
 
 def drop(window: Any, *files: tuple[str, str]) -> None:
-    data = window.evaluate_handle(DROP, [list(file) for file in files])
-    window.dispatch_event("body", "drop", {"dataTransfer": data})
+    Walk(window).drop(list(files))
 
 
 def open_recording(window: Any, recording: Recording) -> None:
@@ -132,7 +136,7 @@ def logs(recording: Recording) -> list[tuple[str, str]]:
 
 
 def test_from_dropped_logs_to_the_error_at_the_noise(
-    window: Any, served: tuple[str, Path], measured: Recording
+    window: Any, served: tuple[str, Path, psutil.Process], measured: Recording
 ) -> None:
     drop(window, *logs(measured))
     window.get_by_text("still needed: the URDF of the rig, or a choice of one joint").wait_for()
@@ -150,7 +154,6 @@ def test_from_dropped_logs_to_the_error_at_the_noise(
     assert over_noise(window, "refitted") > 10.0
     picture(window, "2_compare")
     window.set_viewport_size({"width": 800, "height": 900})
-    picture(window, "2_compare_narrow")
     heads = [window.get_by_role("heading", name=name, exact=True).bounding_box()["y"] for name in STORY]
     assert heads == sorted(heads)
     window.set_viewport_size({"width": 1280, "height": 900})
@@ -180,55 +183,38 @@ def test_from_dropped_logs_to_the_error_at_the_noise(
     assert window.get_by_text("train in it").count() == 0, "a lever is no hand"
     picture(window, "5_saved")
     window.set_viewport_size({"width": 800, "height": 900})
-    picture(window, "6_narrow")
     assert window.evaluate("document.documentElement.scrollWidth") <= 800
     assert read_model(served[1] / "model" / "model.yaml").effects[0].effect == STRIBECK
 
 
-class Hand:
-    """Somebody at the page, whose clicks and keys are counted."""
-
-    def __init__(self, window: Any) -> None:
-        self.window, self.count = window, 0
-
-    def click(self, button: str) -> None:
-        self.window.get_by_role("button", name=button, exact=True).click()
-        self.count += 1
-
-    def choose(self, label: str, option: str) -> None:
-        self.window.get_by_label(label).select_option(option)
-        self.count += 2
-
-
-def test_from_a_bare_log_to_a_named_effect(window: Any) -> None:
-    hand = Hand(window)
+def test_from_a_bare_log_to_a_named_effect(window: Any, served: tuple[str, Path, psutil.Process]) -> None:
+    walk, before = Walk(window), processor_seconds(served[2])
     bare = [(f"run_{seed}.csv", polars.DataFrame(played("pendulum", friction=0.08, seed=seed)).write_csv())
             for seed in (0, 0, 1, 1)]  # fmt: skip
-    drop(window, *((name.replace("run", f"part{k}"), text) for k, (name, text) in enumerate(bare)))
-    hand.count += 1
+    walk.drop([(name.replace("run", f"part{k}"), text) for k, (name, text) in enumerate(bare)])
     window.get_by_text("To be imported: part0_0.csv").wait_for()
     picture(window, "10_bare_log")
-    hand.click("pendulum")
+    walk.click("pendulum")
     window.get_by_label("position", exact=True).last.wait_for()
-    hand.choose("a position is read", "after")
+    walk.choose("a position is read", "after")
     picture(window, "11_one_joint")
     window.set_viewport_size({"width": 800, "height": 900})
-    picture(window, "11_one_joint_narrow")
     assert window.evaluate("document.documentElement.scrollWidth") <= 800
     window.set_viewport_size({"width": 1280, "height": 900})
-    hand.click("Import")
+    walk.click("Import")
     window.get_by_text("only the ratios are known").wait_for()
     window.get_by_role("cell", name="refitted", exact=True).wait_for()
     assert over_noise(window, "refitted") > 5.0
-    hand.click("Diagnose")
+    walk.click("Diagnose")
     window.locator("pre", has_text="coulomb_friction").wait_for(timeout=2 * PATIENCE)
     picture(window, "12_named")
     assert "friction 0.0133" in window.locator("pre").inner_text(), "0.08 N m at 6 N m/rad, of which 1 is made"
-    hand.click("Add what it found")
+    walk.click("Add what it found")
     window.get_by_role("cell", name="+ coulomb_friction@pendulum").wait_for()
     assert over_noise(window, "+ coulomb_friction@pendulum") < 1.6
     picture(window, "13_explained")
-    assert hand.count <= 40
+    assert walk.actions <= 40
+    assert processor_seconds(served[2]) - before < 300.0, "five minutes on a processor of its own"
 
 
 WHEEL = """<link name="{0}"><inertial><mass value="{mass}"/><inertia ixx="{size}" iyy="{size}" izz="{size}" ixy="0"
@@ -236,7 +222,7 @@ ixz="0" iyz="0"/></inertial></link><joint name="{0}" type="continuous"><parent l
 <axis xyz="0 0 1"/></joint>"""
 
 
-def test_two_joints_of_different_gains_are_compared(window: Any, served: tuple[str, Path]) -> None:
+def test_two_joints_of_different_gains_are_compared(window: Any, served: tuple[str, Path, psutil.Process]) -> None:
     gains = {"a": (25.0, 0.5), "b": (12.0, 0.3)}
     wheels = "".join(WHEEL.format(name, mass=MASS, size=MASS * LEVER**2) for name in gains)
     files = [("rig.urdf", f'<robot name="two"><link name="base"/>{wheels}</robot>')]
@@ -314,7 +300,7 @@ def test_a_wrong_file_is_named_with_what_to_do(window: Any, measured: Recording)
 
 
 def test_a_diagnosis_is_stopped_in_the_middle_and_another_one_answers(
-    window: Any, served: tuple[str, Path], measured: Recording
+    window: Any, served: tuple[str, Path, psutil.Process], measured: Recording
 ) -> None:
     open_recording(window, measured)
     window.get_by_role("button", name="Diagnose").click()
@@ -369,7 +355,7 @@ def test_a_number_is_typed_and_fixed(window: Any, measured: Recording) -> None:
     window.get_by_role("button", name="Set", exact=True).click()
     window.get_by_role("cell", name="by hand").wait_for()
     window.get_by_role("button", name="Refit", exact=True).click()
-    window.get_by_text(re.compile(r"kd \[N m s/rad\]: 0.22 fixed")).wait_for()
+    window.get_by_text(re.compile(r"kd \[N m s/rad\] fixed: 0.22")).wait_for()
     window.get_by_label("value", exact=True).fill("0.2O")
     window.get_by_role("button", name="Set", exact=True).click()
     window.get_by_text("'0.2O' is no number").wait_for()
@@ -391,7 +377,7 @@ def test_files_above_200_mb_are_refused_before_they_are_sent(window: Any, measur
 
 
 def test_two_windows_show_one_state_and_the_keyboard_is_enough(
-    window: Any, served: tuple[str, Path], measured: Recording
+    window: Any, served: tuple[str, Path, psutil.Process], measured: Recording
 ) -> None:
     open_recording(window, measured)
     other = window.context.browser.new_page()
@@ -417,7 +403,7 @@ def test_two_windows_show_one_state_and_the_keyboard_is_enough(
 
 
 def test_without_the_token_nothing_is_shown_and_with_it_no_script_reads_it(
-    browser: Any, served: tuple[str, Path]
+    browser: Any, served: tuple[str, Path, psutil.Process]
 ) -> None:
     page = browser.new_page()
     token = served[0].partition("token=")[2]
@@ -441,6 +427,54 @@ HOSTILE = {
     "lines": "a\r\nb",
     "half a character": "a\ud800", "long": "x" * 10_000, "long words": "<b> " * 2_500, "nothing to see": "\u200b\u00ad",
 }  # fmt: skip
+DIVIDED = "".join(f"{0.01 * k:.2f},0.{k % 7},{{}}\n" for k in range(100))
+WHEEL_OF = '<robot name="{}"><link name="base"/></robot>'
+DROPPED = {  # name -> text, what the page says of it
+    "empty.csv": ("", "empty CSV"),
+    "nul.csv": (4 * "\0", "not a complete .csv file"),
+    "page.csv": ("<!DOCTYPE html><script>document.title='run'</script>", "separated by blanks"),
+    "wide.csv": (",".join(f"c{k}" for k in range(30_000)) + "\n" + 29_999 * "1," + "1\n", "holds 30000 columns"),
+    "deep.json": (100_000 * "[", "no JSON of rows or columns"),
+    "nan.csv": ("time,goal,position\n" + DIVIDED.format(*100 * ["nan"]), "'position' has no number in any row"),
+    "inf.csv": ("time,goal,position\n" + DIVIDED.format(*100 * ["inf"]), "received inf"),
+    "file.urdf": (
+        '<!DOCTYPE r [<!ENTITY f SYSTEM "file:///etc/passwd">]>' + WHEEL_OF.format("&f;"),
+        "not well-formed XML",
+    ),
+    "../../outside.csv": ("time,goal,position\n", "dropped/outside.csv: "),
+    "run.py": ("import os", "run.py: neither a log"),
+}
+OPENED = {
+    "model.yaml": ("joints: !!python/object/apply:os.system [touch owned]", "only plain data is read"),
+    "recording.yaml": ("a: &a [" + 9 * "x," + "x]\n" + "".join(
+        f"{new}: &{new} [{9 * f'*{old},'}*{old}]\n" for old, new in zip("abcdef", "bcdefg", strict=True)), "aliases"),
+}  # fmt: skip
+
+
+def test_hostile_files_are_refused_with_their_name_and_the_page_goes_on(
+    window: Any, served: tuple[str, Path, psutil.Process], measured: Recording, tmp_path: Path
+) -> None:
+    drop(window, ("first.csv", "time,goal,position\n" + DIVIDED.format(*range(100))))
+    window.get_by_text("To be imported: first.csv").wait_for()
+    window.get_by_role("button", name="wheel", exact=True).click()
+    window.get_by_label("position", exact=True).last.wait_for()
+    for name, (text, said) in DROPPED.items():
+        drop(window, (name, text))
+        if name in ("nan.csv", "inf.csv"):  # their columns can be shown
+            window.get_by_text(f"To be imported: {name}").wait_for()
+            window.get_by_role("button", name="Import").click()
+        window.get_by_text(said).first.wait_for()
+    for name, (text, said) in OPENED.items():
+        (tmp_path / name).write_text(text)
+        window.get_by_label("Folder of a recording").fill(str(tmp_path / name if name == "model.yaml" else tmp_path))
+        window.get_by_role("button", name="Open").click()
+        window.get_by_text(said).first.wait_for()
+    nothing_ran(window)
+    assert not list(served[1].parent.glob("**/owned"))
+    assert not (served[1] / "outside.csv").exists()
+    open_recording(window, measured)
+
+
 WALK = """() => { const found = []; const walk = (root) => { for (const one of root.querySelectorAll("*")) {
   if (one.matches("img:not([src^='data:image/png']), iframe, object, embed, mjx-container, [onerror], [onload]") ||
     one.matches("[onmouseover], a:not([download])"))

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import polars
 import pytest
+from scipy.io import savemat
 
 import tactile_cube
 from tactile_cube.api.comparison import run_recording
@@ -18,6 +19,7 @@ from tactile_cube.workbench.importing import LOGS, Waiting, import_logs, kept, s
 from tactile_cube.workbench.state import Workbench
 from tests.measurement.small_rig import URDF, table
 from tests.measurement.sources.bare_joint import played
+from tests.measurement.sources.test_mjcf_import import ARM, POSITION
 
 GAINS = {"kp": 3.0, "kd": 0.2}
 HEAD = "t,a_cmd,a_pos,b_cmd,b_pos\n"
@@ -116,11 +118,17 @@ def test_the_page_takes_every_kind_of_log_that_the_command_reads(tmp_path: Path)
     polars.DataFrame(columns).write_csv(tmp_path / "run.tsv", separator="\t")
     (tmp_path / "run.json").write_text(json.dumps({name: values.tolist() for name, values in columns.items()}))
     np.savez(tmp_path / "run.npz", **columns)  # type: ignore[arg-type]
-    for ending in (".tsv", ".json", ".npz"):
+    savemat(tmp_path / "run.mat", columns)
+    polars.DataFrame(columns).write_parquet(tmp_path / "run.parquet")
+    for ending in (".tsv", ".json", ".npz", ".mat", ".parquet"):
         file = kept(tmp_path / "dropped", f"run{ending}", (tmp_path / f"run{ending}").read_bytes())
         seen = Waiting((file,), tmp_path / "rig.urdf", robot="wheel")
         assert seen.with_files([file]).logs == (file,)
         assert import_logs(tmp_path / ending, {**two_joints(tmp_path), "files": [str(file)]})[0].joints == ("a", "b")
+    rig = kept(tmp_path / "dropped", "arm.xml", ARM.replace("ACTUATORS", POSITION).encode())
+    recording, said = import_logs(tmp_path / "out", seen.with_files([rig]).settings)
+    assert (recording.joints, recording.gains.kp.tolist()) == (("a", "b"), [3.0, 2.0])
+    assert any("arm.xml, where you state none" in line for line in said)
 
 
 def test_a_recording_keeps_the_unit_of_its_log(tmp_path: Path) -> None:

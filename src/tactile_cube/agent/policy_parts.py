@@ -2,7 +2,7 @@
 
 The file may come from anywhere, and Hydra makes whatever a configuration names. So all that any command has made of it
 passes `require_parts` first. It names no class that is not in `PARTS`, gives Hydra no other instruction, refers to
-nothing outside itself (`${...}`), and has no file read but those of the package: who has the hand, the object or the
+nothing outside itself (`${...}`), and names only shipped files: who has the hand, the object or the
 grasps in files of their own names them on the command line.
 """
 
@@ -136,7 +136,7 @@ def _require_known(part: Mapping[str, Any], place: str, label: str) -> None:
         raise InputError(f"{label}: its configuration names {target[:60]!r}, which is no part of an environment")
     takes = inspect.signature(getattr(import_module(package), name)).parameters
     for key in part.keys() & takes.keys():
-        kinds = str(takes[key].annotation).split(" | ")
+        kinds = inspect.formatannotation(takes[key].annotation).strip("'").split(" | ")
         value = part[key]
         kinds_known = KINDS.keys() >= set(kinds)
         wrong_flag = isinstance(value, bool) and "bool" not in kinds  # True and False are no numbers

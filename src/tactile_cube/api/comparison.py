@@ -1,18 +1,21 @@
 """Make recordings, and compare one with a model, from a program."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from omegaconf import OmegaConf
+from pydantic import Field
 
 from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
-from tactile_cube.drivetrain.model_file import ModelFile, as_model
+from tactile_cube.drivetrain.model_file import Estimate, ModelFile, Strict, as_model
 from tactile_cube.errors import InputError, warn
 from tactile_cube.identification.contact.grasps import compare_contact
 from tactile_cube.measurement.bench import has_free_motion, with_object, without_touches
 from tactile_cube.measurement.comparing.comparison import USUAL_STEP, Comparison, compare_recording, comparison_json
+from tactile_cube.measurement.recordings.description import NotNegative
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.writing import require_free, write_recordings
@@ -123,6 +126,7 @@ def compare(
     recording: Recording | PathLike,
     *,
     model: ModelFile | PathLike | None = None,
+    gain: float | None = None,
     own_effects: Sequence[str] | None = None,
     step: float | None = None,
     seed: int | None = None,
@@ -134,6 +138,7 @@ def compare(
     Args:
         recording: what was measured, or its folder.
         model: of `identify` or `diagnose`, or its file; None: the values that the recording states.
+        gain: P gain of the controller in this recording over that at which the model was identified.
         own_effects: classes of your own that the model names, as dotted paths.
         step: of the simulation [s]; None: as fine as the sensors need.
         seed: of the randomised simulations.
@@ -150,22 +155,44 @@ def compare(
     return run_comparison(called_job("compare", locals()), recording, model, say)
 
 
+class BandSettings(Strict):
+    """How many randomised simulations make the band, and how far their constants spread."""
+
+    simulations: Annotated[int, Field(ge=0)]
+    spread: dict[str, NotNegative]
+
+
 def run_comparison(
     job: Job, recording: Recording | PathLike, model: ModelFile | PathLike | None, say: Say | None = None
 ) -> ComparisonResult:
     """Compare as a job says: free motion, or grasps where there is nothing else."""
     config, say = job.config, say or job.say
-    model, recording = modelled(model), opened(recording)
+    model, recording = _at_gain(modelled(model), config.gain), opened(recording)
     held = len(with_object(recording).trials)
     if held and not has_free_motion(recording):
         compared = compare_contact(recording, model, config.step or USUAL_STEP, say)
         return ComparisonResult(compared, job, job.seconds)
     if held:
         say(f"{held} trials with an object are left out here; diagnose and identify use them")
-    spread = {str(key): float(value) for key, value in config.band.spread.items()}
-    band = (config.band.simulations, spread, config.seed)
-    compared = compare_recording(without_touches(recording), model, config.step, *band)
+    band = BandSettings.model_validate(OmegaConf.to_container(config.band))
+    randomised = (band.simulations, band.spread, config.seed)
+    compared = compare_recording(without_touches(recording), model, config.step, *randomised)
     return ComparisonResult(compared, job, job.seconds)
+
+
+def _at_gain(model: ModelFile | None, gain: Any) -> ModelFile | None:
+    """The model with so many times the position gain; what else a servo has stays."""
+    if not (isinstance(gain, int | float) and 0.0 < gain < math.inf):
+        raise InputError(f"gain={gain}: give the P gain over that at which the model was identified, a number above 0")
+    if gain == 1.0:
+        return model
+    if model is None or "kp" not in model.values:
+        raise InputError(f"gain={gain}: give model=model.yaml with a kp; without one recording.yaml states the gain")
+    kp = {
+        joint: Estimate(value=gain * one.value, low=gain * one.low, high=gain * one.high, unit=one.unit)
+        for joint, one in model.values["kp"].items()
+    }
+    return model.model_copy(update={"values": model.values | {"kp": kp}})
 
 
 def opened(recording: Recording | PathLike) -> Recording:

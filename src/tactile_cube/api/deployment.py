@@ -15,9 +15,8 @@ from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
 from tactile_cube.deployment.control_loop import ControlLoop, open_angles
 from tactile_cube.deployment.controller import Network, PlayedTargets, PolicyController, excited_targets, read_network
 from tactile_cube.deployment.export import export_policy
-from tactile_cube.deployment.loop_log import LoopLog, Rows, write_runs
 from tactile_cube.deployment.robot import JointLimits, Robot
-from tactile_cube.deployment.run_loop import LoopRun, run_loop
+from tactile_cube.deployment.run_loop import LoopLog, LoopRun, Rows, run_loop, write_runs
 from tactile_cube.deployment.simulated_hand import SimulatedHand
 from tactile_cube.deployment.training_setting import TrainingSetting, training_setting
 from tactile_cube.errors import InputError

@@ -23,7 +23,7 @@ from tactile_cube.identification.model_files import model_file, stated_model
 from tactile_cube.measurement.bench import has_free_motion, with_object, without_touches
 from tactile_cube.measurement.comparing.comparison import compare_recording
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.nominal import require_same_joints
+from tactile_cube.measurement.replay.model import require_same_joints
 from tactile_cube.whole_file import write_json, write_whole, written_together
 
 SHAPES = 3  # of the missing torque of one joint, most telling first

@@ -11,10 +11,9 @@ from hydra.utils import instantiate
 
 from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
 from tactile_cube.errors import InputError
-from tactile_cube.evaluation.environment import environment, worlds
 from tactile_cube.evaluation.episode_record import EpisodeRecord
 from tactile_cube.evaluation.evaluation import Evaluation, EvaluationRun, VariantResult, write_results
-from tactile_cube.evaluation.policies import find_policy
+from tactile_cube.evaluation.policies import environment, find_policy, worlds
 from tactile_cube.evaluation.policy_path import BASELINES, policy_path
 from tactile_cube.evaluation.summary import HEADER, Summary, row
 from tactile_cube.evaluation.training_curve import Curve, read_curve
@@ -53,12 +52,12 @@ class EvaluationResult:
         write_results(folder / "results.json", self.run, self.variants)
         print(f"results: {folder / 'results.json'}")
         if any(variant.variant.axis for variant in self.variants):
-            from tactile_cube.visualization.curves import write_robustness_map
+            from tactile_cube.visualization.charts import write_robustness_map
 
             write_robustness_map(self.variants, self.evaluation.nominal_values, folder / "robustness.png")
             print(f"robustness map: {folder / 'robustness.png'}")
         if film:
-            from tactile_cube.visualization.film import showcase
+            from tactile_cube.visualization.episode_recording import showcase
 
             showcase(self.evaluation, self.variants, folder)
 

@@ -10,15 +10,14 @@ from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
 from tactile_cube.drivetrain.model_file import Estimate, ModelFile, as_model, write_model
 from tactile_cube.errors import InputError
 from tactile_cube.identification.contact.identification import ContactIdentification, contact_effects, identify_contact
-from tactile_cube.identification.export.joint_drive import as_bam
-from tactile_cube.identification.export.robot_file import as_mjcf, as_urdf
+from tactile_cube.identification.export import as_bam, as_mjcf, as_urdf
 from tactile_cube.identification.identification import Identification, identify_effects
 from tactile_cube.identification.in_words import errors_by_stage
 from tactile_cube.identification.model_files import model_file, stated_model
 from tactile_cube.measurement.bench import has_free_motion, touch_offsets, without_touches
 from tactile_cube.measurement.comparing.comparison import compare_recording
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.nominal import nominal_model, require_same_joints
+from tactile_cube.measurement.replay.model import nominal_model, require_same_joints
 from tactile_cube.untrusted_file import below
 from tactile_cube.whole_file import write_json, write_whole, written_together
 
@@ -48,7 +47,7 @@ class IdentificationResult:
     @property
     def text(self) -> str:
         """The error after each stage, and the values with their intervals."""
-        lines = [errors_by_stage(self.data["error"], self.model, self.recording.units)]
+        lines = [errors_by_stage(self.data["error"], self.model, self.recording.shown)]
         for parameter in self.contact.silent if self.contact else []:
             lines.append(f"warning: {parameter}: no trial shows it; its interval is the whole range that was searched")
         return "\n".join(lines)
@@ -65,7 +64,7 @@ class IdentificationResult:
             if self.free is not None:
                 write_report(self._free_page(aside, path, self.free), aside / "report.html")
             elif self.contact is not None:
-                page = contact_report(self.contact, self.model.rig, self.job.command, path)
+                page = contact_report(self.contact, self.recording, self.job.command, path)
                 write_report(page, aside / "report.html")
 
     def _free_page(self, folder: Path, path: str, found: Identification) -> Any:
@@ -75,7 +74,7 @@ class IdentificationResult:
         config, recording = self.job.config, without_touches(self.recording)
         after = compare_recording(recording, self.model, config.step, floor=found.floor)
         write_comparison(after, folder / "identification.rrd")
-        held = [held_section(self.contact.errors, self.contact.joint_errors)] if self.contact else []
+        held = [held_section(self.contact.errors, self.contact.joint_errors, recording.shown)] if self.contact else []
         stages, joints = self.data["error"], self.data["joints"]
         return identification_report(after, stages, joints, self.job.command, path, held)
 
@@ -198,6 +197,8 @@ def run_model_export(
 ) -> ModelExport:
     """Write the file of a job."""
     config = job.config
+    if config.policy is not None:
+        raise InputError(f"policy={config.policy}: format={config.format} is of a model; leave one of them out")
     if config.format not in ENDINGS:
         raise InputError(f"format={config.format}: choose one of {', '.join(ENDINGS)} for model={config.model}")
     if config.model is None and model is None:
@@ -206,6 +207,8 @@ def run_model_export(
         )
     known = as_model(config.model if model is None else model)
     output = Path(config.output or f"{Path(known.rig).name or 'model'}.{ENDINGS[config.format]}")
+    if output.is_dir():
+        raise InputError(f"output={output}: is a folder; name a file")
     if config.format == "bam":
         text, left = as_bam(known, config.bam.joint, config.bam.actuator, config.bam.volts)
     else:

@@ -170,8 +170,12 @@ def _job(config: DictConfig, hydra: Any, command: str, words: Sequence[str], fol
 def _effects(part: Any) -> Iterator[str]:
     """What stands at the keys that name effects, anywhere in a tree."""
     for key, value in part.items() if isinstance(part, dict) else []:
-        if key in EFFECTS and isinstance(value, list):
-            yield from (name for name in value if isinstance(name, str))
+        if key == "agent":  # its hidden layers are no effects
+            continue
+        if key in EFFECTS and value is not None:
+            if not isinstance(value, list) or not all(isinstance(name, str) for name in value):
+                raise InputError(f"{key}={value}: expected a list of names: '{key}=[NAME@JOINT]'")
+            yield from value
         yield from _effects(value)
 
 

@@ -17,7 +17,7 @@ from tactile_cube.identification.model_files import Drift, changed, drifts
 from tactile_cube.identification.search.evidence import worse
 from tactile_cube.measurement.bench import without_touches
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.nominal import require_same_joints
+from tactile_cube.measurement.replay.model import require_same_joints
 from tactile_cube.whole_file import write_json, written_together
 
 

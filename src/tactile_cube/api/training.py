@@ -36,7 +36,7 @@ PUBLISHED: dict[str, dict[str, Any]] = {
     "object": {"shape": "box", "size": 0.08, "mass": 0.05},
 }
 """Hand and object of the paper, by the groups of conf/."""
-KEY = re.compile(r"[+~]*([\w./@]+)")  # what a word of a command line sets
+KEY = re.compile(r"[+~]*([\w./@]+)")  # key that an override sets
 NOT_A_STAGES = re.compile(r"(experiment|stages|judgement|name)\b")  # keys of the training as a whole
 ENGINES = ("bullet", "mujoco")
 GRASPS = 1000  # as many as those that come with the package

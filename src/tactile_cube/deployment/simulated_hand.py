@@ -8,7 +8,7 @@ import numpy as np
 from tactile_cube.deployment.robot import Array, Reading, require_positive
 from tactile_cube.deployment.training_setting import TrainingSetting
 from tactile_cube.env import cube_pose
-from tactile_cube.env.cube_pose import frame_along, seen_along
+from tactile_cube.env.task import frame_along, seen_along
 from tactile_cube.hand import DLR_HAND2
 from tactile_cube.simulation import SimulationOptions, Start, World
 

@@ -158,7 +158,7 @@ def _fingerprint(source: str, effects: Sequence[type[Effect]]) -> str:
 
 
 def _write_once(path: Path, source: str) -> None:
-    """Writes a file that other processes may be writing too: all write the same, the last one replaces the others."""
+    """Write a file that other processes may be writing too: all write the same, the last one replaces the others."""
     if not path.exists():
         handle, draft = tempfile.mkstemp(dir=path.parent, suffix=".py")
         with os.fdopen(handle, "w", encoding="utf-8") as file:

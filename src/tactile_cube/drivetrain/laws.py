@@ -143,7 +143,7 @@ def add_tendons(
     damping: float,
     torque: Array,
 ) -> None:
-    """Adds to torques (N,) the spring that keeps each coupled dof at its place, at q, v (N,) of all dofs.
+    """Add to torques (N,) the spring that keeps each coupled dof at its place, at q, v (N,) of all dofs.
 
     It carries what contacts do to the coupled link; stiffness in [N m/rad], damping in [N m s/rad].
     """

@@ -110,10 +110,11 @@ def read_schema(path: Path, schema: type[Schema]) -> Schema:
 def describe(error: ValidationError) -> str:
     """The first problem of a validation error in one line, and how many more there are."""
     first, more = error.errors()[0], error.error_count() - 1
-    key = ".".join(str(part) for part in first["loc"]) or "the file"
-    value = repr(first["input"])
-    received = "" if first["type"] == "missing" else f", received {value if len(value) <= 60 else f'{value[:57]}...'}"
-    return f"key '{key}': {first['msg']}{received}" + (f" (and {more} more)" if more else "")
+    key = ".".join(str(part) for part in first["loc"])
+    value, message = repr(first["input"]), str(first["msg"]).removeprefix("Value error, ")
+    received = f", received {value if len(value) <= 60 else f'{value[:57]}...'}" if first["type"] != "missing" else ""
+    said = f"key '{key}': {message}{received}" if key else message
+    return said + (f" (and {more} more)" if more else "")
 
 
 def _place(error: yaml.YAMLError) -> str:

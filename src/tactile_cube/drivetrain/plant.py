@@ -1,19 +1,124 @@
-"""A drivetrain and the mechanism that it moves, ready to be stepped: one or more equal fingers, any effects."""
+"""The drivetrain's constants, and the plant: equal chains of joints whose numbers lie in one flat memory."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any
+from itertools import product
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg import eigh
 
-from tactile_cube.drivetrain.constants import DrivetrainConstants
 from tactile_cube.drivetrain.effects.catalogue import matching_joints
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Place, Stage
 from tactile_cube.drivetrain.kernel import MemoryLayout, Topology, load_kernel, plan_memory
 from tactile_cube.drivetrain.signals import COMMAND, FRICTION, MOTOR_POSITION, POSITION, VELOCITY
 from tactile_cube.errors import InputError
 from tactile_cube.hand.rigid_body import RigidBodyTree
+
+PerJoint = float | tuple[float, ...] | Array
+_POSITIVE = ("stiffness", "torque_limit", "rate_limit")
+
+
+@dataclass(frozen=True)
+class DrivetrainConstants:
+    """What turns a desired joint angle into a joint torque; the defaults are the hand's.
+
+    Source: Sievers, Pitz, Bauml (ICRA 2022), table of the authors' website.
+
+    Attributes:
+        kp: K_P [N m/rad].
+        kd: K_D [N m s/rad].
+        stiffness: K_e of the drive's elasticity [N m/rad]; infinite for none.
+        static_friction: F_static, dry friction of the joint [N m].
+        reflected_inertia: i^2 J, the rotor seen from the joint [kg m^2].
+        torque_limit: largest torque of the controller [N m].
+        rate_limit: fastest change of the filtered target [rad/s].
+        sign: `physical`: the motor is ahead of the link, q_m = q + tau / K_e; `printed`: eq. (2) of the paper as it
+            stands, q_m = q - tau / K_e.
+    """
+
+    kp: PerJoint = 3.69
+    kd: PerJoint = 0.25
+    stiffness: PerJoint = 25.0
+    static_friction: PerJoint = 0.02
+    reflected_inertia: PerJoint = 1.5e-3
+    torque_limit: PerJoint = 1.0
+    rate_limit: PerJoint = np.inf
+    sign: Literal["physical", "printed"] = "physical"
+
+    def __post_init__(self) -> None:
+        for name in [entry.name for entry in fields(self) if entry.name != "sign"]:
+            value, positive = getattr(self, name), name in _POSITIVE
+            try:
+                numbers = np.asarray(value, dtype=float)
+            except (TypeError, ValueError):
+                raise InputError(f"drivetrain {name} is {value!r}; give a number or one per joint") from None
+            if numbers.ndim > 1 or not np.all(numbers > 0 if positive else numbers >= 0):
+                wanted = "positive" if positive else "non-negative"
+                raise InputError(f"drivetrain {name} is {value}; give {wanted} numbers")
+        if self.sign not in ("physical", "printed"):
+            raise InputError(f"stiffness sign is '{self.sign}'; use 'physical' or 'printed'")
+        if self.sign == "printed" and np.any(np.asarray(self.kp) >= np.asarray(self.stiffness)):
+            raise InputError(
+                f"kp {self.kp} with stiffness {self.stiffness} N m/rad is unstable with the printed sign: kp must be "
+                "smaller; use sign 'physical'"
+            )
+
+    @property
+    def compliance(self) -> Array:
+        """(q_m - q) / tau [rad/(N m)]: 1 / K_e with the sign chosen."""
+        sign = 1.0 if self.sign == "physical" else -1.0
+        return sign / np.asarray(self.stiffness, dtype=float)
+
+
+BOUND = 2.0
+MOST_CORNERS = 64
+
+
+def damping_number(tree: RigidBodyTree, constants: DrivetrainConstants, dt: float, q: Array) -> float:
+    """Stability number dt * eig_max((M(q) + I)^-1 K_D), with the damping at the joint; explicit steps need less than 2.
+
+    Source: hand.md's trial on this hand; explicit Euler on M v' = -K_D v.
+    """
+    n = len(tree.joint_names)
+    M = tree.actuated_mass_matrix(q) + np.diag(np.broadcast_to(constants.reflected_inertia, n))
+    reaching = constants.kd / (1.0 + constants.compliance * np.asarray(constants.kp))  # through the elasticity
+    damping = np.broadcast_to(np.maximum(constants.kd, reaching), n)
+    return float(dt * eigh(np.diag(damping), M, eigvals_only=True)[-1])
+
+
+def check_damping_stability(
+    tree: RigidBodyTree, constants: DrivetrainConstants, dt: float, poses: Iterable[npt.ArrayLike] | None = None
+) -> float:
+    """The largest damping number over poses (n,); by default zero and the corners of the joints' range.
+
+    Raises:
+        InputError: it reaches 2: the simulation would diverge.
+    """
+    worst = max(damping_number(tree, constants, dt, np.asarray(q, dtype=float)) for q in poses or _corners(tree))
+    if worst >= BOUND:
+        raise InputError(
+            f"drivetrain: K_D dt eig_max(M^-1) = {worst:.2f} must stay below 2 (kd {_text(constants.kd)} N m s/rad, dt "
+            f"{dt:g} s, reflected_inertia {_text(constants.reflected_inertia)} kg m^2); lower kd or dt, or raise "
+            "reflected_inertia"
+        )
+    return worst
+
+
+def _corners(tree: RigidBodyTree) -> list[Array]:
+    own = [tree.dof_names.index(name) for name in tree.joint_names]
+    ends = [(tree.lower[k], tree.upper[k]) for k in own]
+    zero = np.zeros(len(own))
+    if 2 ** len(own) > MOST_CORNERS or not np.all(np.isfinite(ends)):
+        return [zero]
+    return [zero, *(np.array(corner) for corner in product(*ends))]
+
+
+def _text(value: object) -> str:
+    return " ".join(f"{number:g}" for number in np.atleast_1d(np.asarray(value, dtype=float)))
+
 
 EffectClass = type[Effect]
 
@@ -96,6 +201,19 @@ class Plant:
         Per-joint constants hold n (repeated in every chain) or C n numbers; gravity (3,) or (C, 3) [m/s^2] is in the
         frame of each chain's base.
         """
+        memory = self._blank.copy()
+        for key in ("gravity", "engine_gravity"):
+            self.view(memory, key)[...] = gravity
+        self.set_constants(memory, constants)
+        for effect in effects:
+            for joint in matching_joints(effect.joint, self.joint_names):
+                self.set_effect(memory, type(effect), joint, effect.values)
+        self.reset(memory, np.zeros(self.topology.joints))
+        return memory
+
+    @cached_property
+    def _blank(self) -> Array:
+        """What every memory (size,) holds: the mechanism, the step and where things lie."""
         memory = np.zeros(self.size)
         header = {"dt": self.dt, "trace_rows": self.trace_rows, "reading": LAST_SUBSTEP}
         for key, value in {**header, "trace_offset": self.layout.entries["trace"][0], "unsure": UNSURE}.items():
@@ -105,15 +223,7 @@ class Plant:
         self.view(memory, "state_size")[...] = [shape[1] for _, shape in states]
         for key in TREE_KEYS:
             self.view(memory, key)[...] = np.stack([getattr(tree, key) for tree in self.trees])
-        for key in ("gravity", "engine_gravity"):
-            self.view(memory, key)[...] = gravity
         self.view(memory, "contact_torque_limit")[...] = CONTACT_TORQUE_LIMIT
-        self.set_constants(memory, constants)
-        self.view(memory, "command_torque_limit")[...] = self.view(memory, "torque_limit")
-        for effect in effects:
-            for joint in matching_joints(effect.joint, self.joint_names):
-                self.set_effect(memory, type(effect), joint, effect.values)
-        self.reset(memory, np.zeros(self.topology.joints))
         return memory
 
     def set_constants(self, memory: Array, constants: DrivetrainConstants) -> None:
@@ -124,6 +234,7 @@ class Plant:
             if size not in (0, count, self.topology.joints):
                 raise InputError(f"drivetrain {key} has {size} values for {count} joints; give one or one each")
             self.view(memory, key)[...] = np.tile(value, self.topology.chains) if size == count else value
+        self.view(memory, "command_torque_limit")[...] = self.view(memory, "torque_limit")
 
     def set_effect(self, memory: Array, effect: EffectClass, joint: str, values: Mapping[str, float | Array]) -> None:
         """Switch an effect on at a joint of memory (..., size); values may be (batch,) arrays.
@@ -164,8 +275,9 @@ class Plant:
         for key in ("extra", "extra_compliance", "held_back", "contact", "signals", "seen"):
             self.view(memory, key)[...] = 0.0
         self.view(memory, "step")[...] = time / self.dt
-        for effect in self.effects:
-            self.view(memory, f"state:{effect.name}")[...] = 0.0
+        if self.effects:  # their states follow each other
+            first, _ = self.layout.entries[f"state:{self.effects[0].name}"]
+            memory[..., first : self.layout.entries["trace"][0]] = 0.0
         by_chain = (*memory.shape[:-1], self.topology.chains, len(self.topology.leader))
         rows = self.view(memory, "signals")
         for row, key in _STARTING_ROWS.items():

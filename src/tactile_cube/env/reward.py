@@ -1,10 +1,8 @@
-"""The reward of one policy step: one function a term, weighed apart from being measured.
+"""The reward of one policy step: one function a term, its weight apart.
 
 A term is a function with `@term` and a line in `conf/reward/`, its weight. The environment puts the measured terms next
 to the reward, so that a replay can weigh them anew when the weights follow a schedule.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Callable
@@ -14,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.env.cube_pose import CubePose
+from tactile_cube.env.task import CubePose
 from tactile_cube.errors import InputError
 
 TOUCH_FORCE = 0.02
@@ -65,7 +63,7 @@ TERMS: dict[str, Term] = {}
 
 
 def term(sign: int, scaled: bool = False) -> Callable[[Callable[[Step], float]], Callable[[Step], float]]:
-    """Makes a function of a step a term of the reward: +1 earns, -1 costs."""
+    """Make a function of a step a term of the reward: +1 earns, -1 costs."""
 
     def register(measure: Callable[[Step], float]) -> Callable[[Step], float]:
         TERMS[measure.__name__] = Term(measure, sign, scaled)
@@ -196,7 +194,7 @@ class Reward:
     fastest: float
 
     def __init__(self, fastest: float = 1.0, **weights: float):
-        """Refuses terms that there are none of, and values without a meaning."""
+        """Refuse terms that there are none of, and values without a meaning."""
         given = PUBLISHED | weights
         for key, value in (given | {"fastest": fastest}).items():
             if key not in (*TERMS, "fastest"):

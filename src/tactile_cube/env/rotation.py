@@ -1,16 +1,26 @@
 """The rotation task in one world, at 10 Hz, in plain numpy: every learner's environment is made of this one."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.env.cube_pose import CubePose, cube_pose, frame_along, seen_along
 from tactile_cube.env.reward import Reward, Step
-from tactile_cube.env.task import DROPPED, FAULTY, LEFT_RANGE, LIFTED, RUNNING, TILTED, TIME_LIMIT, Task
+from tactile_cube.env.task import (
+    DROPPED,
+    FAULTY,
+    LEFT_RANGE,
+    LIFTED,
+    RUNNING,
+    TILTED,
+    TIME_LIMIT,
+    CubePose,
+    Task,
+    cube_pose,
+    frame_along,
+    seen_along,
+)
 from tactile_cube.hand import DLR_HAND2, Hand, tip_positions
 from tactile_cube.randomization import GraspTable, Randomization, StartPoses, drawn_places
 from tactile_cube.simulation import EpisodeConstants, World
@@ -90,7 +100,7 @@ class RotationEnv:
         constants: EpisodeConstants | None = None,
         hand: Hand = DLR_HAND2,
     ) -> None:
-        """Puts the task into `world`, whose hand is `hand`; `constants` are nominal, None: the published ones."""
+        """Create the task in `world`, whose hand is `hand`; `constants` are nominal, None: the published ones."""
         self.world, self.task, self.reward, self.randomization, self.hand = world, task, reward, randomization, hand
         self.nominal = EpisodeConstants() if constants is None else constants
         self.start_poses = start
@@ -106,11 +116,11 @@ class RotationEnv:
         self.seed(0)
 
     def seed(self, seed: int, index: int = 0) -> None:
-        """Starts the count of episodes anew; `index` tells worlds with the same seed apart."""
+        """Reset the episode counter; `index` separates worlds with the same seed."""
         self._seed, self._index, self._episode = seed, index, 0
 
     def reset(self) -> TimeStep:
-        """Starts the next episode."""
+        """Start the next episode."""
         rng = np.random.default_rng([self._seed, self._index, self._episode])
         self._episode += 1
         self.places = drawn_places(self.odds, rng)

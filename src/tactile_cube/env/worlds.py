@@ -1,7 +1,5 @@
 """Many worlds in one process as one TorchRL environment."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

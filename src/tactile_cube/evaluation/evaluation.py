@@ -1,7 +1,5 @@
 """Evaluate a policy by a protocol: every variant with the same seeds, one verdict an episode, the results as JSON."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping

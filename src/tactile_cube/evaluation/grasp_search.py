@@ -1,7 +1,5 @@
 """Search for grasps that hold the object by themselves: fingertips at random places, then simulated at full weight."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Where the policy file lies that a user names: a path, a run's folder, or a policy that ships with the package."""
 
-from __future__ import annotations
-
 from importlib import resources
 from pathlib import Path
 

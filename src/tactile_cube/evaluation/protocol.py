@@ -1,7 +1,5 @@
 """How a policy is tried: how many episodes, how long, and in which changes of the world."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Run one episode and write down everything that happens in it."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """Many episodes in a few numbers: success with an interval, angles, verdicts, and the table on the terminal."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Sequence

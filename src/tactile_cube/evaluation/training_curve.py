@@ -1,7 +1,5 @@
 """The learning curve of a training run, and when regrasping began."""
 
-from __future__ import annotations
-
 import csv
 import re
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """One row for each episode: a word for what it was, the numbers it rests on, and what is physically wrong with it."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 
@@ -84,7 +82,7 @@ class EpisodeResult:
         rise: mean height of the cube above its start in the last `LATE_SHARE` of the episode [m].
         drift: mean vertical velocity of the cube, below 0 where it sinks [m/s].
         tip_support: as `link_contact` and `link_force_share`: see `touch.support`.
-        reward_terms: sum of each weighed term of the reward.
+        reward_terms: sum of each weighted term of the reward.
         exploits: names of physical exploits found; empty when the turning is honest.
         world: constants of its world, SI units, as `EpisodeRecord.constants` has them.
     """

@@ -68,7 +68,7 @@ def _parsed(file: Path) -> ElementTree.Element:
 
 
 def _include(parent: ElementTree.Element, folder: Path, seen: list[Path]) -> None:
-    """Puts what other files hold in place of each <include>; MuJoCo reads a file once too."""
+    """Put what other files hold in place of each <include>; MuJoCo reads a file once too."""
     for at, child in reversed(list(enumerate(parent))):
         if child.tag != "include":
             continue
@@ -84,7 +84,7 @@ def _include(parent: ElementTree.Element, folder: Path, seen: list[Path]) -> Non
 
 
 def _keep(root: ElementTree.Element, sections: tuple[str, ...]) -> None:
-    """Leaves out what is drawn or sensed; what stays names files in meshes alone."""
+    """Leave out what is drawn or sensed; what stays names files in meshes alone."""
     for child in list(root):
         if child.tag not in sections:
             root.remove(child)

@@ -111,7 +111,7 @@ def _inertia_times(work: Array, row: int, inertia: Array, vector: Vector) -> Vec
 def _add_link(
     parent: Integers, prismatic: Integers, k: int, mass: float, inertia: Array, work: Array, M: Array, h: Array
 ) -> None:
-    """Adds what the motion of link k asks of every joint that carries it."""
+    """Add what the motion of link k asks of every joint that carries it."""
     centre, spin, spin_rate = _at(work, k + 1, CENTRE), _at(work, k + 1, SPIN), _at(work, k + 1, SPIN_RATE)
     arm = _add(centre, _scaled(_at(work, k + 1, ORIGIN), -1.0))
     force = _scaled(_add(_at(work, k + 1, ACCELERATION), _carried(spin, spin_rate, arm)), mass)
@@ -177,7 +177,7 @@ def mass_matrix_and_bias(
 
 @compiled_once
 def add_spin_inertia(parent: Integers, prismatic: Integers, spin: Array, work: Array, M: Array, h: Array) -> None:
-    """Adds inertia about each link's own joint axis, `spin` (N,) [kg m^2], after `mass_matrix_and_bias` filled `work`.
+    """Add inertia about each link's own joint axis, `spin` (N,) [kg m^2], after `mass_matrix_and_bias` filled `work`.
 
     Bullet needs such inertia on light links to stay stable; it is not a reflected rotor inertia: where axes are
     parallel it also resists the parent's motion.
@@ -203,7 +203,7 @@ def add_spin_inertia(parent: Integers, prismatic: Integers, spin: Array, work: A
 
 @compiled_once
 def pull_of_gravity(parent: Integers, prismatic: Integers, mass: Array, gravity: Vector, work: Array, h: Array) -> None:
-    """Adds the torques (N,) on the joints by which `gravity` pulls; `work` is of `mass_matrix_and_bias`."""
+    """Add the torques (N,) on the joints by which `gravity` pulls; `work` is of `mass_matrix_and_bias`."""
     for k in range(len(parent)):
         force, centre = _scaled(gravity, mass[k]), _at(work, k + 1, CENTRE)
         i = k
@@ -220,7 +220,7 @@ def pull_of_gravity(parent: Integers, prismatic: Integers, mass: Array, gravity:
 def add_weight(
     parent: Integers, prismatic: Integers, mass: Array, gravity: Array, other: Array, work: Array, h: Array
 ) -> None:
-    """Turns the bias h under `gravity` (3,) into that under `other` (3,); `work` is of `mass_matrix_and_bias`."""
+    """Turn the bias h under `gravity` (3,) into that under `other` (3,); `work` is of `mass_matrix_and_bias`."""
     change = gravity[0] - other[0], gravity[1] - other[1], gravity[2] - other[2]
     if change[0] != 0.0 or change[1] != 0.0 or change[2] != 0.0:
         pull_of_gravity(parent, prismatic, mass, change, work, h)

@@ -126,7 +126,7 @@ def _parents_first(every: list[Joint], bodies: Mapping[str, Body]) -> tuple[str,
 
 
 def _merge_fixed(root: str, ordered: list[Joint]) -> tuple[list[Joint], Homes, list[Joint]]:
-    """Moves what hangs on a fixed joint into the link before it; also the moving links that no body could be."""
+    """Move what hangs on a fixed joint into the link before it; also the moving links that no body could be."""
     homes: Homes = {root: (root, Placement())}
     moving: dict[str, Joint] = {}
     impossible = []

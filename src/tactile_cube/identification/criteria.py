@@ -1,7 +1,5 @@
 """The numbers that decide what a diagnosis answers, each stated once; conf/criteria holds them with their reasons."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from tactile_cube.errors import InputError

@@ -4,36 +4,140 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
-from tactile_cube.drivetrain.effects.effect import Effect
-from tactile_cube.drivetrain.effects.scales import Scales
+from tactile_cube.drivetrain.effects.effect import Effect, Scales
 from tactile_cube.drivetrain.model_file import ModelErrors, ModelFile
 from tactile_cube.errors import InputError
 from tactile_cube.identification.criteria import STANDARD, Criteria
-from tactile_cube.identification.disturbances import Disturbance, in_time
+from tactile_cube.identification.disturbances import Disturbance, disturbances, in_time, undisturbed
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit
-from tactile_cube.identification.fitting.intervals import Fitted
 from tactile_cube.identification.fitting.problem import Problem
-from tactile_cube.identification.fitting.resolution import resolved
-from tactile_cube.identification.inquiry import NOT_ALL, Inquiry, beside_disturbances
+from tactile_cube.identification.fitting.resolution import Fitted, resolved
 from tactile_cube.identification.next_experiment import Experiment, next_experiment
 from tactile_cube.identification.search.evidence import HeldOut, gain, judge
 from tactile_cube.identification.search.explanation import Explanation
-from tactile_cube.identification.search.findings import CommonOffset, Findings, common_offsets
+from tactile_cube.identification.search.findings import CommonOffset, Findings, common_offsets, find
 from tactile_cube.identification.search.search import BestSoFar, Search
 from tactile_cube.identification.standard_model import StandardModel, fit_standard_model
-from tactile_cube.identification.verdict import Simulations, Unexplained, Verdict
+from tactile_cube.identification.verdict import Simulations, Unexplained, Verdict, decide
 from tactile_cube.measurement.comparing.error import ErrorSummary, free_run_error
-from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_with_links
+from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor, noise_with_links
 from tactile_cube.measurement.joint_scales import joint_scales
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.model import Model, effect_path
-from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.model import Model, effect_path, nominal_model
 from tactile_cube.measurement.replay.simulator import free_run
 from tactile_cube.measurement.replay.windows import steps_per_row
+from tactile_cube.measurement.split import held_out_split, with_test_part
 from tactile_cube.measurement.units import common_unit
+
+MOST_STRETCHES = 12
+"""That follow no model; with so many found, no more are looked for: each time all is searched anew."""
+NOT_ALL = ("unknown_effect", "partly_explained")
+"""Verdicts that say that more is missing than is named."""
+LESS = (*NOT_ALL, "ambiguous")
+"""Verdicts that do not say what is missing and that it is all, the one that says least first."""
+ALL = (len(LESS), True)
+"""What an answer says that names all, and leaves little."""
+
+
+class Answer(NamedTuple):
+    """A verdict and what it came from."""
+
+    search: Search
+    findings: Findings
+    simulations: Simulations
+    verdict: Verdict
+
+    @property
+    def says(self) -> tuple[int, bool]:
+        """How much it says, to be compared: how nearly it names all that is missing, then whether little is left."""
+        little_left = self.verdict.chosen.largest_error <= self.search.criteria.tolerated
+        return (LESS.index(self.verdict.kind) if self.verdict.kind in LESS else len(LESS)), little_left
+
+
+@dataclass(frozen=True)
+class Inquiry:
+    """A recording, and how it is asked.
+
+    Attributes:
+        recording: two or more trials.
+        effects: the catalogue to search.
+        seed: which trials are held out, and which test.
+        say: takes progress lines.
+        known: the model to begin with; None: what the recording's owner states.
+        criteria: what decides.
+    """
+
+    recording: Recording
+    effects: Sequence[type[Effect]]
+    seed: int
+    say: Callable[[str], None]
+    known: ModelFile | None
+    criteria: Criteria
+
+    @cached_property
+    def parts(self) -> tuple[Recording, Recording, Recording | None]:
+        """The trials to fit, those to judge by, and those that only test, if there are enough."""
+        fitted, held_out = held_out_split(self.recording, seed=self.seed)
+        fitted, tested = with_test_part(fitted, len(self.recording.trials), self.seed)
+        return fitted, held_out, tested
+
+    @cached_property
+    def search(self) -> Search:
+        """The trials divided."""
+        fitted, held_out, _ = self.parts
+        asked = (self.effects, self.say, self.known, self.criteria)
+        return Search(fitted, held_out, noise_with_links(self.recording), *asked)
+
+    @cached_property
+    def answer(self) -> Answer:
+        """What is found."""
+        search = self.search
+        findings = find(search)
+        simulations = Simulations(search, findings.base, noise_floor(self.recording))
+        return Answer(search, findings, simulations, decide(findings, self.criteria))
+
+
+class Inquired(NamedTuple):
+    """The final inquiry; the excluded and the suspected intervals."""
+
+    inquiry: Inquiry
+    left_out: tuple[Disturbance, ...] = ()
+    suspected: tuple[Disturbance, ...] = ()
+
+
+def beside_disturbances(inquiry: Inquiry) -> Inquired:
+    """A recording asked without the stretches that follow no model, as when somebody pushes the arm.
+
+    A stretch is left out where other runs of its command show nothing of it at that time; most stand out beside the
+    model with refitted constants already. What was played once may as well be a law that shows nowhere else; it is
+    left out where only so all that is missing can be named.
+    """
+    left_out: tuple[Disturbance, ...] = ()
+    while len(left_out) < MOST_STRETCHES:
+        recording = inquiry.recording
+        found = [one for one in disturbances(inquiry.search, recording, inquiry.search.base.fit.model) if one.repeats]
+        if not found:
+            answer = inquiry.answer
+            found = disturbances(answer.search, recording, answer.simulations.final(answer.verdict.chosen).model)
+            found = [one for one in found if one.repeats] or found
+        proven = any(one.repeats for one in found)
+        if not found or (not proven and inquiry.answer.says == ALL):
+            break
+        for one in found:
+            inquiry.say(
+                f"{one.trial} follows no model from {one.start:.2f} to {one.end:.2f} s ({one.joint}: {one.error:.0f} x "
+                "sensor noise): excluded; repeating the search"
+            )
+        without = replace(inquiry, recording=undisturbed(recording, found))
+        if not proven and without.answer.says <= inquiry.answer.says:
+            return Inquired(inquiry, left_out, tuple(found))
+        inquiry, left_out = without, (*left_out, *found)
+    return Inquired(inquiry, left_out)
+
 
 UNPROVEN = 3
 MOST_STEPS = 1000  # from row to row: more are a sign of a wrong inertia, and would take days
@@ -54,13 +158,13 @@ class Diagnosis:
         floor: noise floor of the recording.
         unexplained: what is left, joint by joint; empty unless something is.
         standard: the field's standard model, which came first.
-        experiment: what would tell rivals, or what is unproven and chance, apart; None without either.
+        experiment: what would separate the rivals, or an unproven effect from chance; None without either.
         held_out: names of the trials that the search chose by.
         tested: names of those that nothing was fitted to or chosen by; without any, those that chose test too.
         known: effects of the model that it began with, NAME@JOINT.
         common: joint offsets that may be the encoder's or the initialisations'.
-        left_out: stretches that follow no model, and that count in nothing above.
-        suspected: stretches that may be such ones, and count.
+        left_out: excluded intervals, which follow no model.
+        suspected: intervals that may follow no model, not excluded.
         unseen: effects that no trial could show.
         criteria: what decided.
     """
@@ -122,7 +226,7 @@ def diagnose_recording(
     recording = in_steps(recording, effects, known, say)
     whole = Inquiry(recording, effects, seed, say, known, criteria)
     standard = fit_standard_model(*whole.parts[:2], noise_with_links(recording), known, effects)
-    first = standard.sentence(common_unit(recording.units.values()))
+    first = standard.sentence(common_unit(recording.shown.values()))
     say.answer, say.following = first.partition(";")[0], "the stated model with its constants refitted"
     say(first)
     inquiry, left_out, suspected = beside_disturbances(whole)

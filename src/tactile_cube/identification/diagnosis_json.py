@@ -1,14 +1,12 @@
 """diagnosis.json: the diagnosis as plain numbers, for scripts."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
 from tactile_cube.identification.criteria import Criteria
 from tactile_cube.identification.diagnosis import Diagnosis
-from tactile_cube.identification.fitting.intervals import Fitted, bounds
+from tactile_cube.identification.fitting.resolution import Fitted, bounds
 from tactile_cube.identification.model_files import effect_estimate
 from tactile_cube.identification.next_experiment import FILE, Experiment
 from tactile_cube.identification.search.candidates import Candidate

@@ -1,6 +1,4 @@
-"""What makes no law of a recording: stretches that follow no model, and commands that were logged late."""
-
-from __future__ import annotations
+"""Intervals of a recording that follow no model, and commands that were logged late."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -17,13 +15,11 @@ from tactile_cube.identification.search.evidence import judge, segment_errors
 from tactile_cube.identification.search.explanation import Proposal
 from tactile_cube.identification.search.proposals import look
 from tactile_cube.identification.search.search import Search
-from tactile_cube.measurement.comparing.noise_floor import noise_with_links
-from tactile_cube.measurement.comparing.repeats import repeats_of
+from tactile_cube.measurement.comparing.noise_floor import noise_with_links, repeats_of
 from tactile_cube.measurement.recordings.description import MOST_LATE
 from tactile_cube.measurement.recordings.reading import DESCRIPTION
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.model import Model
-from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.model import Model, nominal_model
 
 Array = NDArray[np.float64]
 STANDS_OUT = (
@@ -34,11 +30,11 @@ USUAL = 0.9  # of a joint's segments are no worse than usual: what disturbs more
 
 @dataclass(frozen=True)
 class Disturbance:
-    """A stretch of one trial in which a model fails that holds elsewhere.
+    """Interval of one trial in which a model fails that holds elsewhere.
 
     Attributes:
         trial: its name.
-        start: where it begins, with a segment to spare [s].
+        start: where it begins, padded by one window [s].
         end: where it ends, likewise.
         joint: where the error is largest.
         error: RMS of that joint there, in units of the sensor noise.
@@ -56,7 +52,7 @@ class Disturbance:
 
 
 def disturbances(search: Search, recording: Recording, model: Model) -> list[Disturbance]:
-    """Stretches of all trials in which the model fails although it holds elsewhere, and where its command is repeated.
+    """Return the intervals in which the model fails although it holds elsewhere and in repeats of the command.
 
     Args:
         search: cuts trials into segments and simulates them.
@@ -85,7 +81,7 @@ def disturbances(search: Search, recording: Recording, model: Model) -> list[Dis
 
 
 def undisturbed(recording: Recording, found: Iterable[Disturbance]) -> Recording:
-    """The recording with these stretches counting in no error, as dropped samples do not."""
+    """Return the recording with these intervals excluded from every error, as dropped samples are."""
     left_out = {trial.name: trial.valid.copy() for trial in recording.trials}
     times = {trial.name: trial.time for trial in recording.trials}
     for one in found:

@@ -1,7 +1,5 @@
 """Fitting exactly the effects that a user names, one after another, and the error after each step."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -13,9 +11,8 @@ from tactile_cube.drivetrain.model_file import ModelErrors, ModelFile
 from tactile_cube.errors import InputError
 from tactile_cube.identification.disturbances import in_time
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit, noise_inflation
-from tactile_cube.identification.fitting.intervals import Fitted, final_fit
 from tactile_cube.identification.fitting.problem import Problem
-from tactile_cube.identification.fitting.resolution import resolved
+from tactile_cube.identification.fitting.resolution import Fitted, final_fit, resolved
 from tactile_cube.identification.search.candidates import candidates
 from tactile_cube.identification.search.evidence import Judgement
 from tactile_cube.identification.search.residual_starts import residual_candidates
@@ -23,8 +20,7 @@ from tactile_cube.identification.search.search import Search
 from tactile_cube.measurement.comparing.error import ErrorSummary, free_run_error
 from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor, noise_with_links
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.model import Model
-from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.model import Model, nominal_model
 from tactile_cube.measurement.replay.simulator import free_run
 from tactile_cube.measurement.split import held_out_split
 
@@ -82,7 +78,9 @@ def identify_effects(
         InputError: an unknown effect, joint or parameter, or nothing to hold out.
     """
     wanted = [one for text in effects for one in _wanted(text, recording.joints)]
-    classes = tuple(dict.fromkeys(effect for effect, *_ in wanted))
+    classes, places = tuple(dict.fromkeys(effect for effect, *_ in wanted)), [one[:2] for one in wanted]
+    if twice := next((one for k, one in enumerate(places) if one in places[:k]), None):
+        raise InputError(f"effects: '{twice[0].name}@{twice[1]}' is named twice; name it once")
     search, floor = divided(recording, classes, seed, say)
     held_out, base = search.held_out, search.base
     stages = {"nominal": search.start_held_out, "refitted": base.judgement.model}

@@ -1,16 +1,14 @@
 """The diagnosis and the next experiment in plain words."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.next_experiment import FILE, Experiment
 from tactile_cube.identification.safe_commands import QUANTITIES, SCALES, TRIALS
-from tactile_cube.measurement.comparing.repeats import Drift
+from tactile_cube.measurement.comparing.noise_floor import Drift
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.units import TURNS, common_unit, milli, of_joint, short
+from tactile_cube.measurement.units import TURNS, common_unit, milli, named, of_joint, short
 
 OPENING = {
     "adequate": "Nothing is missing at this noise: with its constants refitted the model explains the recording.",
@@ -46,7 +44,7 @@ def answer(result: dict[str, Any], experiment: Experiment | None, constants: Seq
         lines.append("  The recommended model contains them:")
         lines += [_effect(entry, units) for entry in partial]
     lines += [f"  {line}" for line in unproven_effects(unproven)] if unproven else []
-    lines += [_unexplained(entry) for entry in result["unexplained"]]
+    lines += [_unexplained(entry, units) for entry in result["unexplained"]]
     lines += [f"  {common_offset(entry, units)}" for entry in result.get("common_offsets", [])]
     lines += [f"  {line}" for line in (*disturbed(result), *unseen_effects(result))]
     lines += [f"  {Drift(**one).sentence(units.get(one['joint'], TURNS))}." for one in result.get("drift", [])]
@@ -115,7 +113,7 @@ def left_over(result: Mapping[str, Any]) -> str:
     left = milli(error["with_effects"], common_unit(result.get("shown_in", result.get("units", {})).values()))
     windows = result.get("error_over_noise", {}).get("with_effects", floors)
     if windows < LEFT < floors:
-        return f" ({windows:.2f} sensor noises remain in short windows; run freely, the model parts by {left})"
+        return f" ({windows:.2f} sensor noises remain in short windows; in a free run it deviates by {left})"
     return f" ({left} remain, {short(floors, 2)} noise floors)" if floors > LEFT else ""
 
 
@@ -137,7 +135,7 @@ def _effect(entry: dict[str, Any], units: Mapping[str, str]) -> str:
     return f"  {entry['name']} at {', '.join(entry['joints'])}: {values_in_words(entry['parameters'], own)}"
 
 
-def _unexplained(entry: dict[str, Any]) -> str:
+def _unexplained(entry: dict[str, Any], units: Mapping[str, str]) -> str:
     if entry.get("explained", 0.0) > NO_LAW:
         return (
             f"  {entry['joint']}: the effects explain {100 * entry['explained']:.0f} % of the torque missing in the "
@@ -148,8 +146,9 @@ def _unexplained(entry: dict[str, Any]) -> str:
             f"  {entry['joint']}: a black-box model of positions, speeds, torque and time explains none of the rest. "
             "Look for what is not logged: pushes, temperature, supply, timing"
         )
+    signal, _ = named(entry["depends_most_on"] or "no logged signal", units)
     return (
-        f"  {entry['joint']}: the torque missing in {entry['beside']} follows {entry['depends_most_on']} most; "
+        f"  {entry['joint']}: the torque missing in {entry['beside']} follows {signal} most; "
         f"a black-box model could explain {100 * entry['black_box']:.0f} % of what the recommended model leaves"
     )
 

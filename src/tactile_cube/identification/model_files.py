@@ -1,7 +1,5 @@
 """What was identified, as a model file, and what has changed between two of them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -11,10 +9,9 @@ import numpy as np
 from scipy import stats
 
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelErrors, ModelFile, Provenance
-from tactile_cube.identification.fitting.intervals import NORMAL_95, Fitted, bounds
+from tactile_cube.identification.fitting.resolution import NORMAL_95, Fitted, bounds
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.model import Term
-from tactile_cube.measurement.replay.nominal import CONTROLLER, nominal_model
+from tactile_cube.measurement.replay.model import CONTROLLER, Term, nominal_model
 
 UNITS = {
     "kp": "N m/rad",

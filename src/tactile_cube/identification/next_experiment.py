@@ -4,8 +4,6 @@ Telling is what a rival still gets wrong after it was refitted to what the other
 design of experiments for discriminating between two rival models, Biometrika 62, 1975).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,12 +13,11 @@ import polars as pl
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
-from tactile_cube.drivetrain.effects.scales import Scales
+from tactile_cube.drivetrain.effects.effect import Scales
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.gauss_newton import Fit, precision
-from tactile_cube.identification.fitting.problem import Problem
+from tactile_cube.identification.fitting.problem import Problem, Shooting
 from tactile_cube.identification.fitting.resolution import FINER, finer
-from tactile_cube.identification.fitting.shooting import Shooting
 from tactile_cube.identification.fitting.unknowns import Unknown, offset_unknowns
 from tactile_cube.identification.safe_commands import PossibleMotions, Safety, covariance_of_numbers
 from tactile_cube.measurement.recordings.recording import Recording
@@ -41,12 +38,11 @@ class Experiment:
         joints: columns of the commands.
         time: (T,) [s].
         commands: (T, n) [rad].
-        told: how many times over the evidence that decides between two explanations is expected: the least of those
-            pairs that can be told apart.
-        joint: where the models of the least told of these pairs differ most.
+        told: ratio of expected to required evidence, the least of the separable pairs of explanations.
+        joint: where the models of that pair differ most.
         predictions: explanation -> (T, n) [rad], before any refit.
         safety: what the commands do in every model that may be true.
-        inseparable: pairs that none of the commands tells apart.
+        inseparable: pairs that none of the commands separates.
     """
 
     name: str
@@ -91,8 +87,7 @@ def next_experiment(
         noise: (n,) of the position sensors [rad].
         seed: of the commands' phases.
         criteria: what decides between two explanations.
-        extended: the others are the first one and an effect more, which no trial speaks against that shows no such
-            effect: all that counts is whether it would show.
+        extended: the others are the first one and one more effect, so that only its visibility counts.
     """
     motions = PossibleMotions(shooting, recording, list(rivals.values()), criteria.margin)
     proposed = motions.safe_trials(seed)
@@ -139,10 +134,10 @@ def _told(
     noise: Array,
     criteria: Criteria,
 ) -> Array:
-    """How many times over each trial (trials,) alone tells a wrong model from the true one, which predicted it.
+    """Return the ratio of expected to required evidence of each trial (trials,) against a wrong model.
 
     The wrong one is refitted in one step, no further than the recording before lets it. What it then keeps is compared
-    with what speaks against an explanation (`worse`), the error counting that the simulation's own steps make of the
+    with what rejects an explanation (`worse`), with the error that the simulation's own steps make of the
     true one: what differs in fine steps is the machine's, the rest is the simulation's.
     """
     problem = Problem(shooting, shooting.cut(recording, noise, trials))

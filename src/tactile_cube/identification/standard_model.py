@@ -17,21 +17,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects import find_effect
-from tactile_cube.drivetrain.effects.effect import Effect
-from tactile_cube.drivetrain.effects.scales import Scales
+from tactile_cube.drivetrain.effects.effect import Effect, Scales
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.criteria import STANDARD
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit, precision
-from tactile_cube.identification.fitting.intervals import NORMAL_95, standard_errors
-from tactile_cube.identification.fitting.problem import Problem
-from tactile_cube.identification.fitting.shooting import Shooting
+from tactile_cube.identification.fitting.problem import Problem, Shooting
+from tactile_cube.identification.fitting.resolution import NORMAL_95, standard_errors
 from tactile_cube.identification.fitting.unknowns import base_unknowns, every_effect
 from tactile_cube.identification.search.candidates import Candidate, model_unknowns
 from tactile_cube.identification.search.evidence import HeldOut
 from tactile_cube.identification.search.search import some
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.model import Model, Term
-from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.model import Model, Term, nominal_model
 from tactile_cube.measurement.replay.windows import Windows
 from tactile_cube.measurement.units import milli
 

@@ -1,17 +1,15 @@
 """From everything that was tried to an answer: one of five verdicts, and the simulations that it asks for."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from tactile_cube.identification.criteria import STANDARD, Criteria
-from tactile_cube.identification.fitting.intervals import Fitted, final_fit
 from tactile_cube.identification.fitting.problem import Problem
+from tactile_cube.identification.fitting.resolution import Fitted, final_fit
 from tactile_cube.identification.search.evidence import worse
-from tactile_cube.identification.search.explanation import Explanation, contains, named, proven, simplest
+from tactile_cube.identification.search.explanation import Explanation, contains, named, proven, simplest, sound
 from tactile_cube.identification.search.findings import Findings
 from tactile_cube.identification.search.residual_shape import Shape, black_box, missing_torques, shapes
 from tactile_cube.identification.search.search import Search
@@ -40,7 +38,8 @@ def decide(findings: Findings, criteria: Criteria = STANDARD) -> Verdict:
     """The answer to what a search has found."""
     base = findings.base
     found = findings.kept(criteria)
-    plausible = [one for one in found if not at_bound(one)]
+    likely = [one for one in findings.proven(criteria) if not at_bound(one)]
+    plausible = [one for one in sound(likely, criteria) if any(one is other for other in found)]
     if not found:
         small = base.largest_error <= criteria.adequate
         return Verdict("adequate", base) if small else Verdict("unknown_effect", closest((), findings, criteria))
@@ -51,7 +50,7 @@ def decide(findings: Findings, criteria: Criteria = STANDARD) -> Verdict:
     whole = chosen.largest_error <= criteria.tolerated or share > criteria.nearly_whole
     whole &= chosen.error <= criteria.adequate or share >= criteria.most
     if not whole and share < criteria.most:
-        return Verdict("unknown_effect", closest(plausible, findings, criteria))
+        return Verdict("unknown_effect", closest(likely, findings, criteria))
     rivals = find_rivals(chosen, plausible, criteria)
     if not whole:
         return Verdict("partly_explained", chosen, rivals)
@@ -59,7 +58,7 @@ def decide(findings: Findings, criteria: Criteria = STANDARD) -> Verdict:
 
 
 def closest(found: Sequence[Explanation], findings: Findings, criteria: Criteria) -> Explanation:
-    """The explanation that follows the held-out trials best: where none is claimed, a model is there to predict."""
+    """Return the explanation that predicts the held-out trials best."""
     unclear = [one for one in findings.judged if not proven(one, criteria) and not at_bound(one)]
     possible = [findings.base, *found, *unclear]
     return min(possible, key=lambda one: one.judgement.costs.sum())
@@ -122,7 +121,7 @@ class Unexplained:
 
 
 class Simulations:
-    """What a decision asks of an explanation beside its fit: simulated where it matters, each question once."""
+    """Cached checks of an explanation beside its fit: final fit and unexplained torque."""
 
     def __init__(self, search: Search, base: Explanation, floor: NoiseFloor) -> None:
         self.search, self.base, self.floor = search, base, floor

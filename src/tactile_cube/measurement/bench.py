@@ -96,7 +96,7 @@ KINDS: dict[str, Callable[[Array, np.random.Generator], Array]] = {
 
 FORCE = 2.0  # [N] the largest, on the last link
 WEIGHTS = 4  # of which the first is none
-SIDE = 0.1  # [rad] from either side of which a weighed posture is approached, so that friction cancels
+SIDE = 0.1  # [rad] from either side of which a loaded posture is approached, so that friction cancels
 MOVE, HOLD = 0.5, 1.0  # [s] of each approach and of each hold
 SWEEP, SWEEP_TIME = 0.2, 4.0  # [rad], [s] of the command about a clamped posture
 PRESS, APPROACH = 0.1, 2.0  # [rad] beyond the touch, [s] to get there; then HOLD

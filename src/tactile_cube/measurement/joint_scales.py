@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.drivetrain.effects.scales import FINGER, Scales
+from tactile_cube.drivetrain.effects.effect import FINGER, Scales
 from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.measurement.recordings.recording import Recording
 

@@ -2,21 +2,20 @@
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 TURNS, SLIDES, DEGREES = "rad", "m", "deg"
 EITHER = "rad or m"
 MILLION = 1e6  # beyond it numbers are written as powers of ten
-THOUSANDTHS = {TURNS: "mrad", SLIDES: "mm", EITHER: "mrad or mm"}
-SMALL = {unit: (name, 1e3) for unit, name in THOUSANDTHS.items()} | {DEGREES: (DEGREES, math.degrees(1.0))}
+SMALL = {TURNS: ("mrad", 1e3), SLIDES: ("mm", 1e3), EITHER: ("mrad or mm", 1e3), DEGREES: ("deg", math.degrees(1.0))}
 """Unit of a position -> unit of its errors, and how many of them make a rad or m."""
 SLIDING = (("N m", "N"), ("kg m^2", "kg"), ("rad", "m"))
 
 
 def common_unit(units: Iterable[str]) -> str:
-    """The unit of a number over several joints: rad, m, or `rad or m` where some turn and others slide."""
+    """The unit of a number over several joints: deg or m where all have it, else rad; `rad or m` where some slide."""
     found = set(units) or {TURNS}
-    return found.pop() if len(found) == 1 else EITHER
+    return found.pop() if len(found) == 1 else EITHER if SLIDES in found or EITHER in found else TURNS
 
 
 def milli(value: float, unit: str = TURNS, digits: int = 3) -> str:
@@ -50,3 +49,8 @@ def shown(label: str, unit: str) -> tuple[str, float]:
     if unit == DEGREES and "[rad" in label:
         return label.replace("[rad", "[deg"), math.degrees(1.0)
     return of_joint(label, unit), 1.0
+
+
+def named(signal: str, units: Mapping[str, str]) -> tuple[str, float]:
+    """`shown` of a signal that names its joint, such as `velocity of elbow [rad/s]`."""
+    return shown(signal, next((unit for joint, unit in units.items() if f" of {joint} [" in signal), TURNS))

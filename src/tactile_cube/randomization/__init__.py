@@ -5,7 +5,6 @@ from tactile_cube.randomization.grasp_starts import GraspStarts as GraspStarts
 from tactile_cube.randomization.grasp_starts import GraspTable as GraspTable
 from tactile_cube.randomization.grasp_starts import StartPoses as StartPoses
 from tactile_cube.randomization.grasp_starts import StartStates as StartStates
-from tactile_cube.randomization.identified import identified as identified
 from tactile_cube.randomization.randomization import Choice as Choice
 from tactile_cube.randomization.randomization import Constant as Constant
 from tactile_cube.randomization.randomization import Distribution as Distribution
@@ -16,4 +15,5 @@ from tactile_cube.randomization.randomization import Randomization as Randomizat
 from tactile_cube.randomization.randomization import Uniform as Uniform
 from tactile_cube.randomization.randomization import UniformPerJoint as UniformPerJoint
 from tactile_cube.randomization.randomization import drawn_places as drawn_places
+from tactile_cube.randomization.randomization import identified as identified
 from tactile_cube.randomization.randomization import sample as sample

@@ -71,7 +71,7 @@ class StartPoses:
     angles: Array
 
     def sample(self, randomization: Randomization, constants: EpisodeConstants, rng: np.random.Generator) -> Start:
-        """Draws a pose and displaces it.
+        """Draw a pose and displace it.
 
         A cube on a table rests on it: its height and its tilt are then not displaced.
         """
@@ -119,7 +119,7 @@ class Grasps:
     origin: dict[str, str | int] = field(default_factory=dict)
 
     def save(self, path: Path) -> None:
-        """Writes them as a NumPy archive; equal grasps give equal bytes."""
+        """Write them as a NumPy archive; equal grasps give equal bytes."""
         path.parent.mkdir(parents=True, exist_ok=True)
         columns = {name: getattr(self, name).astype(np.float32) for name in COLUMNS}
         rest = {key: value for key, value in asdict(self).items() if key not in COLUMNS}
@@ -127,7 +127,7 @@ class Grasps:
 
     @classmethod
     def load(cls, path: Path) -> Grasps:
-        """Reads what `save` wrote. Raises InputError: there is no such file, or it is no file of grasps."""
+        """Read what `save` wrote. Raises InputError: there is no such file, or it is no file of grasps."""
         data = read_npz(path)
         try:
             angles, targets, positions, quaternions = (np.asarray(data[name], np.float64) for name in COLUMNS)
@@ -196,7 +196,7 @@ class GraspTable:
     others: StartPoses
 
     def sample(self, randomization: Randomization, constants: EpisodeConstants, rng: np.random.Generator) -> Start:
-        """Draws a start; a grasp is taken as it was found, because displacing its parts would loosen it.
+        """Draw a start; a grasp is taken as it was found, because displacing its parts would loosen it.
 
         Raises:
             InputError: the object lies on a table.

@@ -16,8 +16,14 @@ from tactile_cube.errors import InputError
 from tactile_cube.hand import Hand
 from tactile_cube.hand.object_mesh import NamedShape, ObjectMesh, ObjectShape, straight_half, unit_inertia
 from tactile_cube.simulation.constants import Array, EpisodeConstants, Start
-from tactile_cube.simulation.drive import HandDrive
-from tactile_cube.simulation.engine import OBJECT_STATE, SKIN_RELAXATION, Contact, SimulationOptions, named_contact
+from tactile_cube.simulation.engine import (
+    OBJECT_STATE,
+    SKIN_RELAXATION,
+    Contact,
+    HandDrive,
+    SimulationOptions,
+    named_contact,
+)
 
 _TABLE_SIZE = np.array([0.5, 0.5, 0.04])
 TILTED = 0.05
@@ -186,7 +192,7 @@ class BulletEngine:
         return force
 
     def close(self) -> None:
-        """Ends the physics server."""
+        """End the physics server."""
         if pybullet.isConnected(self.client):
             pybullet.disconnect(self.client)
 

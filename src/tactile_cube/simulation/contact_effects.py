@@ -1,7 +1,5 @@
 """Contact effects: properties of fingertips and object that are constants of an episode, one class each."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 from typing import Any, ClassVar
@@ -9,7 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from tactile_cube.drivetrain.effects import Effect, Parameter, Stage, find_effect
-from tactile_cube.drivetrain.effects.scales import Scales
+from tactile_cube.drivetrain.effects.effect import Scales
 from tactile_cube.errors import InputError
 from tactile_cube.simulation.constants import EpisodeConstants
 

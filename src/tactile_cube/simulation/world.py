@@ -9,8 +9,7 @@ from tactile_cube.drivetrain.signals import COMMAND, MOTOR_POSITION, POSITION, T
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, Hand, tip_positions
 from tactile_cube.simulation.constants import Array, EpisodeConstants, Start
-from tactile_cube.simulation.drive import HandDrive
-from tactile_cube.simulation.engine import OBJECT_STATE, Contact, Engine, SimulationOptions
+from tactile_cube.simulation.engine import OBJECT_STATE, Contact, Engine, HandDrive, SimulationOptions
 from tactile_cube.simulation.health import find_fault
 
 _JOINT_SIGNALS = {"q": POSITION, "dq": VELOCITY, "q_m": MOTOR_POSITION, "q_d": COMMAND, "torque": TORQUE}
@@ -37,7 +36,7 @@ class World:
     def __init__(
         self, hand: Hand = DLR_HAND2, options: SimulationOptions | None = None, effects: Sequence[Effect] = ()
     ) -> None:
-        """Builds the bodies and the compiled control step, with further effects of the drivetrain, each at a joint.
+        """Build the bodies and the compiled control step, with further effects of the drivetrain, each at a joint.
 
         Raises:
             InputError: The options name no single engine.
@@ -56,7 +55,7 @@ class World:
     # --- running -------------------------------------------------------------------------------------------------
 
     def reset(self, constants: EpisodeConstants, start: Start) -> None:
-        """Starts an episode.
+        """Start an episode.
 
         Raises:
             InputError: Constants or start of another hand, or a torque loop that would be unstable with this time step.
@@ -92,7 +91,7 @@ class World:
         )
 
     def set_weight(self, scale: float) -> None:
-        """Gives the cube a share of its weight until changed or reset: the engine's gravity.
+        """Give the cube a share of its weight until changed or reset: the engine's gravity.
 
         The control step keeps the fingers' whole.
         """
@@ -114,7 +113,7 @@ class World:
         self._drive.view("external_torque")[self.hand.of_finger(finger)] = np.stack(columns, axis=1).T @ force
 
     def close(self) -> None:
-        """Ends the simulation."""
+        """End the simulation."""
         self._engine.close()
 
     # --- read-outs -----------------------------------------------------------------------------------------------

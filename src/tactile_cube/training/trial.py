@@ -15,7 +15,7 @@ from tactile_cube.evaluation.policies import ActorPolicy
 from tactile_cube.evaluation.protocol import Protocol
 from tactile_cube.evaluation.summary import Summary
 from tactile_cube.transforms import EnvConfig
-from tactile_cube.visualization.film import write_film
+from tactile_cube.visualization.episode_recording import write_film
 
 ENGINES = ("bullet", "mujoco")
 SEED = 20_264

@@ -1,11 +1,10 @@
 """Charts of the reports, and figures of a comparison: Matplotlib draws them as SVG text that needs nothing else."""
 
-from __future__ import annotations
-
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from io import StringIO
+from io import BytesIO, StringIO
+from pathlib import Path
 from typing import Any
 
 import matplotlib
@@ -14,8 +13,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from tactile_cube.evaluation.evaluation import VariantResult
+from tactile_cube.evaluation.training_curve import ANGLE, CURRICULUM, REGRASPING, STEPS, Curve
 from tactile_cube.measurement.comparing.comparison import Comparison
-from tactile_cube.measurement.units import THOUSANDTHS
+from tactile_cube.measurement.units import SMALL, shown
+from tactile_cube.whole_file import write_whole
 
 Array = NDArray[np.float64]
 
@@ -141,30 +143,31 @@ def overlay(comparison: Comparison, trial: int, joint: int, before: Comparison |
     With `before`, the comparison of the model as it was, its simulation is drawn too.
     """
     one, name = comparison.recording.trials[trial], comparison.recording.joints[joint]
-    axes = time_chart(f"{name} [{comparison.recording.units[name]}]")
+    unit = comparison.recording.shown[name]
+    axes, size = time_chart(f"{name} [{unit}]"), shown("[rad]", unit)[1]
     _shade(axes, comparison, trial, joint)
     if not comparison.recording.torque_controlled:
-        axes.plot(one.time, one.command[:, joint], "--", color=FLOOR, linewidth=1.0, label="command")
-    axes.plot(one.time, _measured(comparison, trial, joint), color=MEASURED, linewidth=1.8, label="measured")
+        axes.plot(one.time, size * one.command[:, joint], "--", color=FLOOR, linewidth=1.0, label="command")
+    axes.plot(one.time, size * _measured(comparison, trial, joint), color=MEASURED, linewidth=1.8, label="measured")
     if before is not None:
-        axes.plot(one.time, _simulated(before, trial, joint), "--", color=BEFORE, label="simulated before")
+        axes.plot(one.time, size * _simulated(before, trial, joint), "--", color=BEFORE, label="simulated before")
     after = "simulated" if before is None else "simulated after"
-    axes.plot(one.time, _simulated(comparison, trial, joint), color=SIMULATED, linewidth=1.4, label=after)
+    axes.plot(one.time, size * _simulated(comparison, trial, joint), color=SIMULATED, linewidth=1.4, label=after)
     return svg(axes)
 
 
 def residual(comparison: Comparison, trial: int, joint: int, before: Comparison | None = None) -> str:
     """Measured minus simulated of one joint in one trial beside the noise floor; with `before`, also of that model."""
     time = comparison.recording.trials[trial].time
-    axes = _difference_chart(comparison, joint, 170 if before is None else 200)
-    floor = 1e3 * 1.96 * comparison.floor.joints[comparison.recording.joints[joint]]
+    axes, size = _difference_chart(comparison, joint, 170 if before is None else 200)
+    floor = size * 1.96 * comparison.floor.joints[comparison.recording.joints[joint]]
     axes.axhspan(-floor, floor, color=FLOOR, alpha=0.18, linewidth=0, label="noise floor (95 %)")
-    errors = 1e3 * comparison.residuals[trial][:, joint]
+    errors = size * comparison.residuals[trial][:, joint]
     if before is None:
         _shade(axes, comparison, trial, joint)
         axes.plot(time, errors, color=ERROR, linewidth=1.2, label="measured - simulated")
     else:
-        axes.plot(time, 1e3 * before.residuals[trial][:, joint], color=BEFORE, linewidth=1.2, label="error before")
+        axes.plot(time, size * before.residuals[trial][:, joint], color=BEFORE, linewidth=1.2, label="error before")
         axes.plot(time, errors, color=SIMULATED, linewidth=1.4, label="error after")
     return svg(axes)
 
@@ -175,20 +178,22 @@ def band(comparison: Comparison, trial: int, joint: int) -> str:
     if randomised is None:
         return ""
     nominal = comparison.simulated[trial].position[:, joint]
-    low, high = (1e3 * (edge[trial][:, joint] - nominal) for edge in (randomised.low, randomised.high))
-    axes = _difference_chart(comparison, joint, 200)
+    axes, size = _difference_chart(comparison, joint, 200)
+    low, high = (size * (edge[trial][:, joint] - nominal) for edge in (randomised.low, randomised.high))
     few = slice(None, None, max(1, len(time) // MOST_POINTS))
     axes.fill_between(
         time[few], low[few], high[few], color=SIMULATED, alpha=0.25, linewidth=0, label="95 % of the simulations"
     )
-    measured = 1e3 * (_measured(comparison, trial, joint) - nominal)
+    measured = size * (_measured(comparison, trial, joint) - nominal)
     axes.plot(time, measured, color=MEASURED, linewidth=1.2, label="measured")
     return svg(axes)
 
 
-def _difference_chart(comparison: Comparison, joint: int, height: int) -> Axes:
+def _difference_chart(comparison: Comparison, joint: int, height: int) -> tuple[Axes, float]:
+    """Axes of a joint's errors, and how many of their unit make a rad or m."""
     name = comparison.recording.joints[joint]
-    return time_chart(f"{name} [{THOUSANDTHS[comparison.recording.units[name]]}]", height)
+    unit, size = SMALL[comparison.recording.shown[name]]
+    return time_chart(f"{name} [{unit}]", height), size
 
 
 def _shade(axes: Axes, comparison: Comparison, trial: int, joint: int) -> None:
@@ -234,3 +239,97 @@ def _simulated(comparison: Comparison, trial: int, joint: int) -> Array:
     simulated = comparison.simulated[trial].position
     difference = comparison.recording.trials[trial].position - simulated - comparison.residuals[trial]
     return simulated[:, joint] + float(np.nanmean(difference[:, joint]))
+
+
+MAP_COLUMNS = 3
+
+
+def write_learning_curves(curve: Curve, path: Path) -> None:
+    """Draw mean final angle over environment steps, and below it what the curriculum did.
+
+    Args:
+        curve: the run.
+        path: file to write; its ending (.png, .svg) chooses the format.
+    """
+    figure = Figure(figsize=(6.0, 6.0), layout="constrained")
+    angle, schedule = figure.subplots(2, 1, sharex=True, height_ratios=[3, 1])
+    million = np.divide(curve.columns[STEPS], 1e6)
+    angle.plot(million, curve.columns[ANGLE], linewidth=1.2)
+    for name, dashes in zip(CURRICULUM, ("-", ":"), strict=True):
+        if name in curve.columns:
+            schedule.plot(million, curve.columns[name], "C0", linestyle=dashes, linewidth=1.2)
+    _mark_regrasping(angle)
+    angle.set(title=curve.label)
+    schedule.set(xlabel="environment steps [million]", ylabel="T_s [s] (solid),\ngravity (dotted)", ylim=(0, None))
+    schedule.grid(alpha=0.3)
+    _write(figure, path)
+
+
+def write_sweep_curves(runs: Mapping[str, Mapping[int, Curve]], path: Path, title: str) -> None:
+    """Draw the mean final angle over environment steps: a thin line each run, a thick one the median of a setting.
+
+    Args:
+        runs: setting -> seed -> learning curve; the median goes as far as the shortest of them.
+        path: file to write; its ending (.png, .svg) chooses the format.
+        title: of the picture.
+    """
+    figure = Figure(figsize=(8, 5), layout="constrained")
+    axis = figure.subplots()
+    for number, (setting, curves) in enumerate(sorted(runs.items())):
+        color, every = f"C{number % 10}", list(curves.values())
+        for curve in every:
+            axis.plot(np.divide(curve.columns[STEPS], 1e6), curve.columns[ANGLE], color=color, linewidth=0.6, alpha=0.6)
+        steps = np.linspace(0, min(curve.columns[STEPS][-1] for curve in every), 200)
+        angles = [np.interp(steps, curve.columns[STEPS], curve.columns[ANGLE]) for curve in every]
+        label = f"{setting} ({len(every)} {'run' if len(every) == 1 else 'runs'})"
+        axis.plot(steps / 1e6, np.median(angles, axis=0), color=color, linewidth=2.0, label=label)
+    _mark_regrasping(axis)
+    axis.set(xlabel="environment steps [million]", title=title)
+    figure.legend(loc="outside lower center", fontsize=7, ncols=1 if len(runs) < 5 else 2)
+    _write(figure, path)
+
+
+def _write(figure: Figure, path: Path) -> None:
+    picture = BytesIO()
+    figure.savefig(picture, format=path.suffix.removeprefix("."), dpi=110)
+    write_whole(path, picture.getbuffer())
+
+
+def _mark_regrasping(axis: Axes) -> None:
+    axis.axhline(REGRASPING, color="grey", linestyle="--", linewidth=0.8)
+    axis.annotate("regrasping", (0, REGRASPING), xycoords=("axes fraction", "data"), ha="left", va="bottom", size=8)
+    axis.set_ylabel("mean final angle [rad]")
+    axis.grid(alpha=0.3)
+
+
+def write_robustness_map(variants: Sequence[VariantResult], nominal_values: Mapping[str, float], path: Path) -> None:
+    """Draw the mean final angle over each varied axis, and beside each point how many episodes kept the cube.
+
+    Args:
+        variants: results, the nominal one first; those with an `axis` are drawn.
+        nominal_values: where the nominal condition lies on each axis.
+        path: file to write.
+    """
+    names = list(dict.fromkeys(one.variant.axis for one in variants if one.variant.axis))
+    rows = -(-len(names) // MAP_COLUMNS)
+    figure = Figure(figsize=(10, 2.6 * rows), layout="constrained")
+    panels = list(figure.subplots(rows, MAP_COLUMNS, sharey=True, squeeze=False).flat)
+    for panel, name in zip(panels, names, strict=False):
+        points = [(one.variant.value, one.summary) for one in variants if one.variant.axis == name]
+        if name in nominal_values:
+            points.append((nominal_values[name], variants[0].summary))
+            panel.axvline(nominal_values[name], color="grey", linewidth=0.8, linestyle="--")
+        values, summaries = zip(*sorted(points, key=lambda point: point[0]), strict=True)
+        means = [one.mean_angle for one in summaries]
+        panel.errorbar(values, means, [one.std_angle for one in summaries], marker="o", capsize=3, linewidth=1.2)
+        for value, one in points:
+            label = f"{one.kept}/{one.episodes}"
+            panel.annotate(label, (value, one.mean_angle), (4, 5), textcoords="offset points", size=7)
+        panel.axhline(0.0, color="black", linewidth=0.6)
+        panel.margins(x=0.15, y=0.2)
+        panel.grid(alpha=0.3)
+        panel.set_xlabel(name)
+    for panel in panels[len(names) :]:
+        panel.set_visible(False)
+    figure.supylabel("mean final angle [rad]; label: episodes that kept the cube")
+    _write(figure, path)

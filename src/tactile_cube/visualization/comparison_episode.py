@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.comparing.comparison import Comparison
-from tactile_cube.measurement.units import THOUSANDTHS, milli
+from tactile_cube.measurement.units import SMALL, milli, shown
 from tactile_cube.visualization.charts import marked
 from tactile_cube.visualization.comparison_report import outcome
 from tactile_cube.visualization.rerun_recording import Branch, log_robot, recording_file, whole
@@ -53,11 +53,11 @@ def _blueprint(comparison: Comparison) -> rrb.Blueprint:
         rrb.Vertical(
             rrb.TimeSeriesView(name=f"{joint}: command, measured, simulated [{unit}]", origin=f"/joints/{joint}/angle"),
             rrb.TimeSeriesView(
-                name=f"{joint}: measured - simulated [{THOUSANDTHS[unit]}]", origin=f"/joints/{joint}/error"
+                name=f"{joint}: measured - simulated [{SMALL[unit][0]}]", origin=f"/joints/{joint}/error"
             ),
             name=joint,
         )
-        for joint, unit in comparison.recording.units.items()
+        for joint, unit in comparison.recording.shown.items()
     ]
     worst = max(comparison.errors.joints, key=lambda j: comparison.errors.joints[j] / comparison.floor.joints[j])
     left = rrb.Vertical(
@@ -73,7 +73,7 @@ def _blueprint(comparison: Comparison) -> rrb.Blueprint:
 
 
 def _in_words(comparison: Comparison) -> str:
-    units, floors = comparison.recording.units, comparison.floor.joints
+    units, floors = comparison.recording.shown, comparison.floor.joints
     rows = [
         f"| {joint} | {milli(error, units[joint])} | {milli(floors[joint], units[joint])} |"
         for joint, error in comparison.errors.joints.items()
@@ -104,7 +104,8 @@ def _log_robot(branch: Branch, comparison: Comparison, starts: list[float]) -> N
 
 def _log_joint(branch: Branch, comparison: Comparison, index: int, joint: str, starts: list[float]) -> None:
     recording, trials = comparison.recording, comparison.recording.trials
-    stride = max(1, round(recording.rate / SIGNAL_RATE))
+    stride, unit = max(1, round(recording.rate / SIGNAL_RATE)), recording.shown[joint]
+    times = shown("[rad]", unit)[1]
 
     def joined(parts: Sequence[Array]) -> Array:
         """All trials on one time line; a missing sample after each interrupts the curve."""
@@ -121,12 +122,12 @@ def _log_joint(branch: Branch, comparison: Comparison, index: int, joint: str, s
         branch.always(entity, rr.SeriesLines(names=[name], colors=[colour], widths=[width]))
         branch.columns(entity, time, rr.Scalars.columns(scalars=values))
 
-    measured = joined([trial.position[:, index] for trial in trials])
-    residual = 1e3 * joined([error[:, index] for error in comparison.residuals])
+    measured = times * joined([trial.position[:, index] for trial in trials])
+    residual = SMALL[unit][1] * joined([error[:, index] for error in comparison.residuals])
     angle, error = f"joints/{joint}/angle", f"joints/{joint}/error"
     if not recording.torque_controlled:
-        send(f"{angle}/command", "command", COMMAND, joined([trial.command[:, index] for trial in trials]))
-    simulated = joined([one.position[:, index] for one in comparison.simulated])
+        send(f"{angle}/command", "command", COMMAND, times * joined([trial.command[:, index] for trial in trials]))
+    simulated = times * joined([one.position[:, index] for one in comparison.simulated])
     send(f"{angle}/simulated", "simulated", SIMULATED, simulated)
     for entity, name, colour, values in (
         (angle, "measured", MEASURED, measured),
@@ -140,7 +141,7 @@ def _log_events(branch: Branch, comparison: Comparison, starts: list[float]) -> 
     begin = dict(zip((trial.name for trial in comparison.recording.trials), starts, strict=True))
     for trial, start in begin.items():
         branch.log("failing", rr.TextLog(f"trial {trial}", level=rr.TextLogLevel.INFO), start)
-    units = comparison.recording.units
+    units = comparison.recording.shown
     for one in comparison.failing_intervals:
         line = f"{one.joint} in {one.trial}: {one.start:.2f} .. {one.end:.2f} s, {milli(one.error, units[one.joint])}"
         branch.log("failing", rr.TextLog(line, level=rr.TextLogLevel.WARN), begin[one.trial] + one.start)

@@ -3,7 +3,7 @@
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.measurement.comparing.comparison import AT_THE_FLOOR, Comparison
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.units import MILLION, THOUSANDTHS, common_unit, milli, short
+from tactile_cube.measurement.units import MILLION, SMALL, common_unit, milli, short
 from tactile_cube.visualization import charts as figures
 from tactile_cube.visualization.report import Block, Figure, Listing, Report, Section, Table
 
@@ -25,11 +25,12 @@ FLOORS = {
 def summary(comparison: Comparison) -> str:
     """What the command line prints: the answer, one line a joint, where it fails."""
     errors, floor, raw = comparison.errors, comparison.floor, comparison.raw[0]
-    unit = common_unit(comparison.recording.units.values())
+    unit = common_unit(comparison.recording.shown.values())
+    small, times = SMALL[unit]
     table = [(joint, error, floor.joints[joint], raw.joints[joint]) for joint, error in errors.joints.items()]
     rows = []
     for joint, error, noise, plain in [*table, ("all", errors.overall, floor.overall, raw.overall)]:
-        cells = ((1e3 * error, 9, 3), (1e3 * noise, 9, 3), (error / noise, 15, 2), (1e3 * plain, 9, 3))
+        cells = ((times * error, 9, 3), (times * noise, 9, 3), (error / noise, 15, 2), (times * plain, 9, 3))
         numbers = "".join(_cell(*cell) for cell in cells)
         rows.append(f"{joint:<16}{numbers}" + (f"{_cell(comparison.fit[joint], 7, 1)} %" if joint != "all" else ""))
     sources = {
@@ -42,7 +43,7 @@ def summary(comparison: Comparison) -> str:
         "",
         f"{'joint':<16}{'error':>9}{'floor':>9}  error / floor      raw      fit",
         *rows,
-        f"RMS of free runs from the first state, {THOUSANDTHS[unit]}. error: the joint offsets of each initialisation "
+        f"RMS of free runs from the first state, {small}. error: the joint offsets of each initialisation "
         "removed; raw: nothing removed; fit: 100 % (1 - |raw error| / |motion|)",
         "",
         f"noise floor: {sources[floor.source]}",
@@ -61,7 +62,7 @@ def summary(comparison: Comparison) -> str:
 
 def outcome(comparison: Comparison) -> str:
     """The result in one or two sentences."""
-    unit = common_unit(comparison.recording.units.values())
+    unit = common_unit(comparison.recording.shown.values())
     head = (
         f"The simulated joints are {milli(comparison.errors.overall, unit)} (RMS) away from the measured ones; "
         f"{milli(comparison.floor.overall, unit)} would be noise alone."
@@ -110,7 +111,7 @@ def recording_section(recording: Recording, model: ModelFile | None) -> Section:
 
 def error_section(comparison: Comparison) -> Section:
     """The error of each joint beside its noise floor."""
-    floor, units = comparison.floor, comparison.recording.units
+    floor, units = comparison.floor, comparison.recording.shown
     rows = []
     for joint, error in comparison.errors.joints.items():
         known = (error, floor.joints[joint], floor.sensor.get(joint), floor.step_size.get(joint))
@@ -148,7 +149,7 @@ def overlay_section(
     for name in order[:MOST_OVERLAYS]:
         joint = comparison.recording.joints.index(name)
         trial = figures.worst_trial(worst, joint)
-        one, unit = comparison.recording.trials[trial], comparison.recording.units[name]
+        one, unit = comparison.recording.trials[trial], comparison.recording.shown[name]
         error = milli(comparison.trials[trial].joints[name], unit)
         fell = error if before is None else f"{milli(before.trials[trial].joints[name], unit)} before, {error} after"
         caption = f"{name}, its worst trial {one.name} ({one.kind}): {fell}."

@@ -9,7 +9,7 @@ from tactile_cube.identification.next_experiment import Experiment
 from tactile_cube.identification.search.residual_shape import Shape
 from tactile_cube.measurement.comparing.comparison import Comparison
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.units import THOUSANDTHS, TURNS, common_unit, milli, of_joint, short
+from tactile_cube.measurement.units import SMALL, TURNS, common_unit, milli, named, of_joint, short
 from tactile_cube.visualization.charts import PALETTE, SIMULATED, Interval, bar_chart, interval_chart, svg, time_chart
 from tactile_cube.visualization.comparison_report import (
     overlay_section,
@@ -47,14 +47,14 @@ def stage_section(
 ) -> Section:
     """The error after each step, down to the noise floor; `units` are those of the joints, by default rad."""
     units = units or {}
-    unit = THOUSANDTHS[common_unit(units.values())]
-    bars = [(STAGES.get(key, key), 1e3 * v) for key, v in stages.items() if key != "noise_floor" and v is not None]
+    unit, size = SMALL[common_unit(units.values())]
+    bars = [(STAGES.get(key, key), size * v) for key, v in stages.items() if key != "noise_floor" and v is not None]
     floor = stages.get("noise_floor")
     caption = (
         "RMS position error on trials that were held out from the fit (where there are enough, on trials "
         "that nothing was chosen by either); the dashed line is what noise alone would leave."
     )
-    blocks: list[Block] = [Figure(bar_chart(bars, unit, None if floor is None else 1e3 * floor), caption)]
+    blocks: list[Block] = [Figure(bar_chart(bars, unit, None if floor is None else size * floor), caption)]
     if joints:
         names = list(next(iter(joints.values())))
         steps = [STAGES.get(stage, stage) for stage in joints]
@@ -65,9 +65,11 @@ def stage_section(
     return Section(title, (), blocks)
 
 
-def held_section(stages: Mapping[str, float], joints: Mapping[str, Mapping[str, float]]) -> Section:
+def held_section(
+    stages: Mapping[str, float], joints: Mapping[str, Mapping[str, float]], units: Mapping[str, str]
+) -> Section:
     """The same of the trials with an object, which refit no constants."""
-    return stage_section({k: v for k, v in stages.items() if k != "refitted"}, joints, HELD)
+    return stage_section({k: v for k, v in stages.items() if k != "refitted"}, joints, HELD, units)
 
 
 def effect_section(effects: Sequence[Mapping[str, Any]], units: Mapping[str, str] | None = None) -> list[Section]:
@@ -104,19 +106,20 @@ def shape_section(shapes: Sequence[Shape], units: Mapping[str, str] | None = Non
     ]
     blocks = []
     for one in sorted(shapes, key=lambda shape: -shape.explained):
-        unit = (units or {}).get(one.joint, TURNS)
-        axes = time_chart(f"{one.joint} [m{of_joint('N m', unit)}]", 200, of_joint(one.against, unit))
+        torque = of_joint("N m", (units or {}).get(one.joint, TURNS))
+        against, size = named(one.against, units or {})
+        axes, x = time_chart(f"{one.joint} [m{torque}]", 200, against), size * one.centres
         low, high = 1e3 * (one.mean - one.spread), 1e3 * (one.mean + one.spread)
         label = "+- one standard deviation"
-        axes.fill_between(one.centres, low, high, color=SIMULATED, alpha=0.25, linewidth=0, label=label)
-        axes.plot(one.centres, 1e3 * one.mean, color=SIMULATED, linewidth=2.0, label="missing torque")
+        axes.fill_between(x, low, high, color=SIMULATED, alpha=0.25, linewidth=0, label=label)
+        axes.plot(x, 1e3 * one.mean, color=SIMULATED, linewidth=2.0, label="missing torque")
         share = f"explains {100 * one.explained:.0f} % of what {one.beside or 'the model'} lacks."
-        blocks.append(Figure(svg(axes), f"{one.joint} against {one.against}: {share}"))
+        blocks.append(Figure(svg(axes), f"{one.joint} against {against}: {share}"))
     return [Section("The shape of what is unexplained", text, blocks)]
 
 
 def ranking_section(ranking: Sequence[Any]) -> list[Section]:
-    """The candidates that were weighed, best first."""
+    """Return the section of the candidates considered, best first."""
     rows = [row for row in ranking if isinstance(row, Mapping)][:MOST_RANKED]
     if not rows:
         return []
@@ -127,7 +130,7 @@ def ranking_section(ranking: Sequence[Any]) -> list[Section]:
     ]
     table = Table([COLUMNS.get(key, key) for key in keys], cells)
     text = ["Rows without numbers were given up after a first look: others explained more."]
-    return [Section("What else was weighed", text, [table], folded=True)]
+    return [Section("Candidates considered", text, [table], folded=True)]
 
 
 def value_section(comparison: Comparison) -> Section:
@@ -201,9 +204,10 @@ def _experiment_section(experiment: Experiment, units: Mapping[str, str]) -> Sec
         joint, unit = experiment.joints.index(experiment.joint), units.get(experiment.joint, TURNS)
         predictions = {name: values[:, joint] for name, values in experiment.predictions.items()}
         mean = sum(predictions.values()) / len(predictions)
-        axes = time_chart(f"{experiment.joint} [{THOUSANDTHS[unit]}]", 220)
+        small, size = SMALL[unit]
+        axes = time_chart(f"{experiment.joint} [{small}]", 220)
         for k, (name, values) in enumerate(predictions.items()):
-            axes.plot(experiment.time, 1e3 * (values - mean), color=PALETTE[k % len(PALETTE)], label=name)
+            axes.plot(experiment.time, size * (values - mean), color=PALETTE[k % len(PALETTE)], label=name)
         caption = f"What each candidate predicts for {experiment.joint} before any refit, relative to their mean."
         blocks.append(Figure(svg(axes), caption))
     return Section("What to record next", proposal(experiment), blocks)
@@ -229,14 +233,14 @@ def diagnosis_report(
         shapes: shape of what stays unexplained.
         experiment: what would tell the rivals apart.
     """
-    units = before.recording.units
+    units = before.recording.shown
     return Report(
         title=f"What is missing? {before.recording.name}",
-        answer=answer(diagnosis, None),
+        answer=answer(diagnosis | {"shown_in": units}, None),
         tone=TONES.get(diagnosis["verdict"], "warn"),
         sections=[
             stage_section(diagnosis["error"], diagnosis.get("error_joints", {}), units=units),
-            *(held_section(one["error"], one["error_joints"]) for one in [diagnosis.get("contact")] if one),
+            *(held_section(one["error"], one["error_joints"], units) for one in [diagnosis.get("contact")] if one),
             *effect_section(diagnosis["effects"], units),
             *shape_section(shapes, units),
             *ranking_section(diagnosis["ranking"]),
@@ -271,7 +275,7 @@ def identification_report(
     steps = [value for key, value in stages.items() if key != "noise_floor" and value is not None]
     effects = after.model.effects if after.model is not None else []
     found = [{"name": e.name, "joints": [e.joint or "object"], "parameters": e.parameters} for e in effects]
-    units = after.recording.units
+    units = after.recording.shown
     unit = common_unit(units.values())
     return Report(
         title=f"Identified: {after.recording.name}",
@@ -295,12 +299,13 @@ def identification_report(
 
 def contact_diagnosis_report(result: dict[str, Any], recording: Recording, command: str, model_path: str) -> Report:
     """The page of a diagnosis of fingertips and object alone, from the content of diagnosis.json."""
+    units = recording.shown
     return Report(
         title=f"What is missing? {recording.name}",
-        answer=answer(result, None),
+        answer=answer(result | {"shown_in": units}, None),
         tone=TONES.get(result["verdict"], "warn"),
         sections=[
-            held_section(result["error"], result["error_joints"]),
+            held_section(result["error"], result["error_joints"], units),
             *effect_section(result["effects"]),
             *ranking_section(result["ranking"]),
             next_section(result, model_path, recording, None),
@@ -309,14 +314,19 @@ def contact_diagnosis_report(result: dict[str, Any], recording: Recording, comma
     )
 
 
-def contact_report(found: ContactIdentification, name: str, command: str, model_path: str) -> Report:
+def contact_report(found: ContactIdentification, recording: Recording, command: str, model_path: str) -> Report:
     """The page of an identification of contact effects alone."""
+    unit = common_unit(recording.shown.values())
     effects = [{"name": one.effect, "joints": ["object"], "parameters": one.parameters} for one in found.effects()]
     return Report(
-        title=f"Identified: {name}",
-        answer=f"The error on trials that the fit never saw fell from {milli(found.errors['nominal'])} to "
-        f"{milli(found.errors['with_effects'])}.",
+        title=f"Identified: {recording.name}",
+        answer=f"The error on trials that the fit never saw fell from {milli(found.errors['nominal'], unit)} to "
+        f"{milli(found.errors['with_effects'], unit)}.",
         tone="plain" if found.silent else "good",
-        sections=[held_section(found.errors, found.joint_errors), *effect_section(effects), train_section(model_path)],
+        sections=[
+            held_section(found.errors, found.joint_errors, recording.shown),
+            *effect_section(effects),
+            train_section(model_path),
+        ],
         footer=f"Made by tactile_cube: {command}",
     )

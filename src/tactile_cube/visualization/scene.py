@@ -1,7 +1,5 @@
 """The hand and an object with six distinguishable sides in PyBullet's software renderer."""
 
-from __future__ import annotations
-
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path

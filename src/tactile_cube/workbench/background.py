@@ -17,7 +17,7 @@ import numpy as np
 
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.errors import InputError
-from tactile_cube.identification.fitting.intervals import Fitted
+from tactile_cube.identification.fitting.resolution import Fitted
 from tactile_cube.measurement.recordings.recording import Recording
 
 ANSWER = "best answer so far: "

@@ -16,7 +16,7 @@ from tactile_cube.identification.search.residual_shape import Missing
 from tactile_cube.measurement.comparing.comparison import Comparison
 from tactile_cube.measurement.comparing.error import residuals
 from tactile_cube.measurement.recordings.trial import Trial
-from tactile_cube.measurement.units import SMALL, TURNS, shown
+from tactile_cube.measurement.units import SMALL, TURNS, named, shown
 from tactile_cube.visualization.charts import BEFORE, ERROR, FAILING, FLOOR, GRID, MEASURED, PALETTE, SIMULATED
 from tactile_cube.workbench.missing_torque import curve
 from tactile_cube.workbench.text import label, plain
@@ -159,11 +159,6 @@ class TimeChart:
 
 def _rows(trial: Trial) -> slice:
     return slice(None, None, 1 + len(trial.time) // DRAWN)
-
-
-def named(signal: str, units: Mapping[str, str]) -> tuple[str, float]:
-    """A signal's label in the unit in which its joint is shown, and what its values are to be multiplied by."""
-    return shown(signal, next((unit for joint, unit in units.items() if f" of {joint} [" in signal), TURNS))
 
 
 class MissingChart:

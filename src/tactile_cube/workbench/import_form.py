@@ -64,7 +64,7 @@ class ImportForm:
         self.texts = {key: field(title) for key, title in (ONE_JOINT | CONTROLLER | MOTOR | SERVO | MORE).items()}
         self.mode = select("commands are", *NEEDED, width=110)
         self.mode.on_change("value", lambda attr, old, new: self._show_motor())
-        self.servo = select("servo", NONE, *servos(), width=110)
+        self.servo = select("servo", NONE, *servos(), width=140)
         self.read = select("a position is read", BEFORE, "after", width=170)
         self.units = {
             key: select(f"{key.removesuffix('_unit')} in", AUTO, *known, width=150) for key, known in UNITS.items()

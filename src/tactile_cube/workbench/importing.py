@@ -23,7 +23,7 @@ from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTa
 from tactile_cube.measurement.sources.column_map import map_columns
 from tactile_cube.measurement.sources.csv_files import kinds_of
 from tactile_cube.measurement.sources.log_file import LEROBOT, READERS, read_logs
-from tactile_cube.measurement.sources.mechanism import Lever
+from tactile_cube.measurement.sources.mechanism import lever_rig
 from tactile_cube.measurement.sources.source import recording_tables, source_settings
 from tactile_cube.untrusted_file import below
 from tactile_cube.whole_file import write_whole
@@ -93,7 +93,7 @@ class Waiting:
         if self.lacks:
             return None
         table = read_logs(self.logs[0])[0].table
-        rig = read_rig(self.urdf) if self.urdf else Lever(str(self.robot)).rig()
+        rig = read_rig(self.urdf) if self.urdf else lever_rig(str(self.robot))
         joints = [name for name, joint in rig.joints.items() if joint.mimics is None]
         names, count = list(table), min(SHOWN, len(next(iter(table.values()))))
         rows = [[float(column[k]) for column in table.values()] for k in range(count)]

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.identification.fitting.intervals import NORMAL_95
 from tactile_cube.identification.fitting.problem import Problem
+from tactile_cube.identification.fitting.resolution import NORMAL_95
 from tactile_cube.identification.search.residual_shape import MANY, PARABOLA, Missing, missing_torques, shapes
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model

@@ -11,9 +11,9 @@ from tornado.ioloop import IOLoop
 
 from tactile_cube.identification.in_words import next_steps
 from tactile_cube.measurement.replay.model import effect_path
-from tactile_cube.measurement.units import milli
+from tactile_cube.measurement.units import milli, named
 from tactile_cube.visualization.charts import SIMULATED
-from tactile_cube.workbench.charts import ExperimentChart, MissingChart, TimeChart, named
+from tactile_cube.workbench.charts import ExperimentChart, MissingChart, TimeChart
 from tactile_cube.workbench.desk import Desk
 from tactile_cube.workbench.import_form import ImportForm
 from tactile_cube.workbench.importing import LOGS, RIGS, number
@@ -39,20 +39,26 @@ class Page:
         self.document, self.desk = document, desk
         self.showing = False  # while the desk's state is put into widgets, their callbacks are ours
         self.drawn: dict[str, tuple[object, ...]] = {}  # part -> what it depended on when it was drawn
-        self.form, self.status = ImportForm(desk), text_of(name="status")
-        steps = {
+        self.form, self.status, self.stairs = ImportForm(desk), text_of(name="status"), text_of()
+        self.missing, self.signal = MissingChart(), select("over", width=300)
+        self.experiment, self.proposal = ExperimentChart(), text_of()
+        folder = field("folder", 300, value=str(desk.folder / "model"))
+        self._when(self.signal)
+        undo = button("Undo", lambda: desk.change("undo", Workbench.undo))
+        propose = button("Propose", desk.propose)
+        steps: dict[str, tuple[str, list[models.LayoutDOM]]] = {
             "compare": ("Compare", self._compare_part()),
-            "missing": ("Missing torque", self._missing_part()),
+            "missing": ("Missing torque", [self.signal, self.missing.figure]),
             "candidates": ("What may be missing", self._candidates_part()),
             "diagnosis": ("Diagnosis", self._diagnosis_part()),
-            "stages": ("Error by stage", self._stages_part()),
+            "stages": ("Error by stage", [self.stairs, row_of(undo)]),
             "values": ("Numbers of the model", self._values_part()),
-            "next": ("Next experiment", self._next_part()),
-            "save": ("Save", self._save_part()),
+            "next": ("Next experiment", [row_of(propose), self.proposal, self.experiment.figure]),
+            "save": ("Save", [row_of(folder, button("Save", lambda: desk.save(folder.value)))]),
         }
         self.steps = [
-            column_of(text_of(TITLE.format(title), styles=LINE), part, name=name, visible=False)
-            for name, (title, part) in steps.items()
+            column_of(text_of(TITLE.format(title), styles=LINE), *parts, name=name, visible=False)
+            for name, (title, parts) in steps.items()
         ]
         for part in (self._open_part(), self.status, self.form.whole, *self.steps):
             document.add_root(part)
@@ -61,7 +67,7 @@ class Page:
         document.on_session_destroyed(lambda context: desk.listeners.remove(listener))
         self.refresh()
 
-    def _when(self, widget: models.Model, work: Callable[[], object], what: str = "value") -> None:
+    def _when(self, widget: models.Model, work: Callable[[], object] = lambda: None, what: str = "value") -> None:
         """Do something, and show what came of it, when somebody changes a widget."""
 
         def changed(attr: str, old: object, new: object) -> None:
@@ -91,23 +97,18 @@ class Page:
         files.on_change("value", lambda attr, old, new: self.document.add_next_tick_callback(take))
         return row_of(path, button("Open", lambda: self.desk.open(path.value)), files, name="open")
 
-    def _compare_part(self) -> models.LayoutDOM:
+    def _compare_part(self) -> list[models.LayoutDOM]:
         self.time, self.sentences = TimeChart(), text_of()
-        self.trial, self.joint = select("trial"), select("joint", width=90)
+        self.trial, self.joint = select("trial"), select("joint", width=120)
         self.other, self.where = select("beside", NONE), select("where it fails", NONE)
         self.over = models.MultiSelect(title="errors of other trials", size=3, width=190)
         for one in (self.trial, self.joint, self.other, self.over):
-            self._when(one, lambda: None)
+            self._when(one)
         self._when(self.where, self._zoom)
         choices = row_of(self.trial, self.joint, self.other, self.where, self.over)
-        return column_of(choices, *self.time.figures, self.sentences)
+        return [choices, *self.time.figures, self.sentences]
 
-    def _missing_part(self) -> models.LayoutDOM:
-        self.missing, self.signal = MissingChart(), select("over", width=300)
-        self._when(self.signal, lambda: None)
-        return column_of(self.signal, self.missing.figure)
-
-    def _candidates_part(self) -> models.LayoutDOM:
+    def _candidates_part(self) -> list[models.LayoutDOM]:
         self.looks: list[Look] = []
         self.ranked = models.RadioGroup(labels=[], sizing_mode="stretch_width")
         self.another = select("another effect", width=260)
@@ -115,37 +116,25 @@ class Page:
         self._when(self.another, lambda: self.another.value == NONE or self.ranked.update(active=None))
         self.card, self.unseen = text_of(), text_of()
         add = button("Add and refit", self._add, "primary")
-        return column_of(self.ranked, row_of(self.another, add), self.card, self.unseen)
+        return [self.ranked, row_of(self.another, add), self.card, self.unseen]
 
-    def _diagnosis_part(self) -> models.LayoutDOM:
+    def _diagnosis_part(self) -> list[models.LayoutDOM]:
         self.start = button("Diagnose", lambda: (self.desk.stop if self.desk.running else self.desk.diagnose)())
         self.accept = button("Add what it found", self._accept, "primary")
         self.progress = text_of()
-        return column_of(row_of(self.start, self.accept), self.progress)
+        return [row_of(self.start, self.accept), self.progress]
 
-    def _stages_part(self) -> models.LayoutDOM:
-        self.stairs = text_of()
-        return column_of(self.stairs, row_of(button("Undo", lambda: self.desk.change("undo", Workbench.undo))))
-
-    def _values_part(self) -> models.LayoutDOM:
+    def _values_part(self) -> list[models.LayoutDOM]:
         self.values: dict[str, Value] = {}
-        self.sliders, self.number = column_of(), select("number", width=200)
+        self.sliders, self.number = column_of(), select("number", width=175)
         self._when(self.number, self._show_number)
         self.typed = [field(title, 90) for title in ("value", "at least", "at most")]
         self.fixed = models.CheckboxGroup(labels=["fixed"], width=70, align="end")
         self.present = select("effects of the model", width=260)
-        self.remove = button("Remove and refit", self._remove)
+        self.remove = button("Remove and refit", lambda: self._change("removing", self.present.value, Workbench.remove))
         typed = (self.number, *self.typed, self.fixed, button("Set", self._set_typed))
         refit = button("Refit", lambda: self.desk.change("refitting", Workbench.refit))
-        return column_of(self.sliders, row_of(*typed, refit), row_of(self.present, self.remove))
-
-    def _next_part(self) -> models.LayoutDOM:
-        self.experiment, self.proposal = ExperimentChart(), text_of()
-        return column_of(row_of(button("Propose", self.desk.propose)), self.proposal, self.experiment.figure)
-
-    def _save_part(self) -> models.LayoutDOM:
-        folder = field("folder", 300, value=str(self.desk.folder / "model"))
-        return row_of(folder, button("Save", lambda: self.desk.save(folder.value)))
+        return [self.sliders, row_of(*typed, refit), row_of(self.present, self.remove)]
 
     # What is clicked
 
@@ -169,12 +158,10 @@ class Page:
 
     def _add(self) -> None:
         if self.candidate:
-            label = f"{self.candidate}@{self.joint.value}"
-            self.desk.change(f"adding {label}", lambda bench: bench.add(label))
+            self._change("adding", f"{self.candidate}@{self.joint.value}", Workbench.add)
 
-    def _remove(self) -> None:
-        label = self.present.value
-        self.desk.change(f"removing {label}", lambda bench: bench.remove(label))
+    def _change(self, how: str, label: str, work: Callable[[Workbench, str], object]) -> None:
+        self.desk.change(f"{how} {label}", lambda bench: work(bench, label))
 
     def _accept(self) -> None:
         found = self.desk.found
@@ -345,12 +332,11 @@ class Page:
 
     def _slider(self, one: Value) -> models.Slider:
         name = one.key.replace(f"@{self.joint.value}", "")
-        found = "" if one.interval is None else f" in [{one.interval[0]:.4g}, {one.interval[1]:.4g}]"
-        found = " fixed" if one.fixed else found
+        found = " fixed" if one.fixed else "" if one.interval is None else " in [{:.4g}, {:.4g}]".format(*one.interval)
         low, high = one.unknown.low, one.unknown.high
         slider = models.Slider(
             start=low, end=high, value=one.value, step=(high - low) / 1000, sizing_mode="stretch_width",
-            title=plain(f"{name} [{one.unit}]: {one.value:.4g}{found}; now", 3 * LABEL),
+            title=plain(f"{name} [{one.unit}]{found}", 3 * LABEL),
             format=models.PrintfTickFormatter(format="%.4g"),
         )  # fmt: skip
         slider.on_change("value", lambda attr, old, new: self._move(one, new))

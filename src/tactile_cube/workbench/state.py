@@ -20,8 +20,8 @@ from tactile_cube.errors import InputError
 from tactile_cube.identification.diagnosis import Unseen, in_steps, test_errors, unseen
 from tactile_cube.identification.disturbances import in_time
 from tactile_cube.identification.fitting.gauss_newton import Fit, renewed
-from tactile_cube.identification.fitting.intervals import NORMAL_95, Fitted, standard_errors
 from tactile_cube.identification.fitting.problem import Problem
+from tactile_cube.identification.fitting.resolution import NORMAL_95, Fitted, standard_errors
 from tactile_cube.identification.identification import with_effect
 from tactile_cube.identification.model_files import UNITS, model_file
 from tactile_cube.identification.next_experiment import Experiment, next_experiment
@@ -38,8 +38,7 @@ from tactile_cube.measurement.comparing.error import ErrorSummary
 from tactile_cube.measurement.comparing.noise_floor import noise_floor, noise_with_links
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
-from tactile_cube.measurement.replay.model import Model, effect_path
-from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.model import Model, effect_path, nominal_model
 from tactile_cube.measurement.replay.simulator import Simulated, free_run
 from tactile_cube.measurement.split import held_out_split, with_test_part
 from tactile_cube.measurement.units import of_joint
@@ -52,7 +51,7 @@ Array = NDArray[np.float64]
 STATED, REFITTED, BY_HAND = "stated", "refitted", "by hand"
 BEGUN = 2  # stages of a model to which nothing was added: stated, refitted
 AT_ONCE = 24  # candidates that are screened between two looks at who waits
-RANKED = 10  # effects that a look shows
+RANKED, LEAST = 10, 0.005  # effects that a look shows, and the share that each takes away at least
 ALIKE = 0.95  # correlation of what two laws change, beside all constants, from which on these trials do not part them
 MOST = 50
 """Changes that can be undone; each keeps a fit and a judgement, some MB."""
@@ -194,7 +193,7 @@ class Workbench:
             share = 1.0 - found.cost / max(frozen.cost, 1e-12)
             look = Look(candidate, found.model, frozen.residual - found.residual, share)
             best[look.name] = max(look, best.get(look.name, look), key=lambda one: one.share)
-        ranked = sorted((one for one in best.values() if one.share > 0.0), key=lambda one: -one.share)[:RANKED]
+        ranked = sorted((one for one in best.values() if one.share >= LEAST), key=lambda one: -one.share)[:RANKED]
         self._looks |= {f"{one.name}@{joint}": one for one in ranked}
         return _together(ranked, Screen(problem, frozen)) if ranked else []
 

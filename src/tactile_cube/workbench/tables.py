@@ -9,7 +9,6 @@ from tactile_cube.api.effects import effects
 from tactile_cube.drivetrain.effects import catalogue
 from tactile_cube.identification.criteria import STANDARD
 from tactile_cube.measurement.comparing.comparison import Comparison
-from tactile_cube.measurement.comparing.regimes import where_it_fails
 from tactile_cube.measurement.units import milli
 from tactile_cube.workbench.state import BY_HAND, ModelStage, Workbench
 from tactile_cube.workbench.text import Html, html, listed, picture
@@ -58,7 +57,6 @@ def remark(before: ModelStage, after: ModelStage) -> str:
 def error_of_trial(compared: Comparison, joint: str) -> Html:
     """Return how far a joint's free run is from one trial, where, and behind a fold whether that is noise."""
     units = compared.recording.shown
-    said = where_it_fails(compared.regimes, compared.errors.joints, compared.floor, units)
     error = f"{joint} in this trial: {milli(compared.errors.joints[joint], units[joint])} RMS of the free run"
     white = next(one for one in compared.whiteness if one.joint == joint)
     lines = [
@@ -70,7 +68,7 @@ def error_of_trial(compared: Comparison, joint: str) -> Html:
         for one in causes
     ]
     return html(
-        listed([error, *(one for one in said if one.startswith(f"{joint} "))]),
+        listed([error, *(one for one in compared.sentences if one.startswith(f"{joint} "))]),
         FOLDED.format("residual test", listed(lines)),
     )
 

@@ -31,7 +31,7 @@ def text_of(*parts: str, styles: dict[str, str] | None = None, **more: Any) -> D
     return pane
 
 
-def field(title: str, width: int = 150, **more: Any) -> TextInput:
+def field(title: str, width: int = 170, **more: Any) -> TextInput:
     """A text to type."""
     return TextInput(title=plain(title), width=width, **more)
 

@@ -14,8 +14,7 @@ from tactile_cube.hand import DLR_HAND2
 from tactile_cube.hand.rigid_body import Mimic, RigidBodyTree
 from tactile_cube.measurement.comparing.error import free_run_error
 from tactile_cube.measurement.recordings.reading import read_recording
-from tactile_cube.measurement.replay.model import terms_of
-from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.model import nominal_model, terms_of
 from tactile_cube.measurement.replay.simulator import free_run
 
 QUIET = replace(circle.BENCH, seconds=2.0, initialisations=1, kinds=("multisine",), noise=1e-9, resolution=1e-9)

@@ -11,7 +11,7 @@ import polars as pl
 import pytest
 import yaml
 
-from benchmarks.blind import generator, hidden, judge, page
+from benchmarks.blind import generator, hidden, judge
 from benchmarks.blind.dynamics import mass_and_bias
 from benchmarks.blind.physics import simulate
 from benchmarks.blind.plant import neutral
@@ -236,7 +236,7 @@ def test_an_answer_after_which_nobody_looks_further_is_confidently_wrong(
     assert score(_truth(PLAY), answer, ratio).confident == confident
 
 
-def test_the_page_names_commit_seeds_and_what_was_drawn_again() -> None:
+def test_the_summary_counts_what_was_drawn_again_and_the_row_names_commit_and_seeds() -> None:
     truth = {**_truth(PLAY), "seed": 7, "drawn": 2, "visible": False}
     line = {
         "seed": 7,
@@ -244,21 +244,12 @@ def test_the_page_names_commit_seeds_and_what_was_drawn_again() -> None:
         "diagnosis": _answer("ambiguous", PLAY, rivals=("cogging",)),
         "wall_seconds": 1.0,
     }
-    command = "python -m benchmarks.blind.judge --draws 1 --first-seed 7"
-    judged = [judge.judged({**line, "commit": "abc"})]
-    text = page.markdown(judged, judge.summarise(judged), command)
-    assert f"Command: `{command}`; commit: abc." in text
-    assert "in 1 of 1 draws" in text
-    assert "1 stayed below that" in text
-    assert "ambiguous answers: 1; candidates that each leaves open: 2" in text
-    sized = page.markdown(judged, judge.summarise(judged), f"{command} --worlds sizes")
-    assert sized.startswith("# Blind diagnosis of hidden effects: machines of other sizes\n")
-    assert "somebody pushed in" not in text
-    pushed = judge.judged({**line, "truth": truth | {"pushes": [{"trial": "t", "start": 1.0, "seconds": 1.0}]}})
-    said = page.markdown([pushed], judge.summarise([pushed]), command)
-    assert "- trials that somebody pushed in: 1; pushes left out: 0; other stretches left out: 0" in said
-    row = page.round_row(judge.summarise(judged), command)
+    summary = judge.summarise([judge.judged({**line, "commit": "abc"})])
+    assert (summary["drawn_again"], summary["below_visible"], summary["ambiguous_set_sizes"]) == (1, 1, [2])
+    row = judge.round_row(summary, "python -m benchmarks.blind.judge --draws 1 --first-seed 7")
     assert row == "| 7, 1 | `abc` | 0, 1, 0 (0) | 0 of 0 | ... |"
+    pushed = judge.judged({**line, "truth": truth | {"pushes": [{"trial": "t", "start": 1.0, "seconds": 1.0}]}})
+    assert judge.summarise([pushed])["pushes"] == [1, 0, 0]
 
 
 def test_the_judge_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

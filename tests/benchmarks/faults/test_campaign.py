@@ -8,8 +8,7 @@ import pytest
 
 import tactile_cube.agent
 import tactile_cube.training
-from benchmarks.faults.campaign import SHORT, damaged_checkpoints, results, same, strike, undisturbed
-from benchmarks.faults.kinds import KINDS
+from benchmarks.faults.campaign import KINDS, SHORT, damaged_checkpoints, results, same, strike, undisturbed
 
 
 @pytest.mark.timeout(900)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from benchmarks.mechanics import CASES, Answer
+from benchmarks.mechanics.case import Setting
 from benchmarks.mechanics.page import mechanics_page
 from benchmarks.mechanics.refinement import Outcome, Refinement, refined
-from benchmarks.mechanics.settings import Setting
 from tactile_cube.simulation import SimulationOptions
 
 ENGINES = ("bullet", "mujoco")

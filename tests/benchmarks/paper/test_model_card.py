@@ -4,8 +4,16 @@ from typing import Any
 
 import pytest
 
-from benchmarks.paper.ancestry import Ancestor, ancestry_table, in_words, read_ancestry, read_table, total
-from benchmarks.paper.model_card import model_card, read_card
+from benchmarks.paper.model_card import (
+    Ancestor,
+    ancestry_table,
+    in_words,
+    model_card,
+    read_ancestry,
+    read_card,
+    read_table,
+    total,
+)
 from tactile_cube.agent.networks import Actor, Sizes
 from tactile_cube.agent.policy_file import PolicyInfo, load_actor, save_policy
 from tactile_cube.errors import InputError

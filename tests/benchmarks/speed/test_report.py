@@ -1,13 +1,8 @@
-"""Rates and ratios, tables and pictures."""
+"""Rates and ratios, and their tables."""
 
 import json
-from pathlib import Path
 
-from PIL import Image
-
-from benchmarks.speed.picture import write_picture
-from benchmarks.speed.report import Figure, Growth, Section, durations, rates
-from benchmarks.speed.table import table
+from benchmarks.speed.report import Figure, Growth, Section, durations, rates, table
 from benchmarks.speed.timing import Timing
 
 TIMINGS = {"ours": Timing(cpu=[0.1, 0.2, 0.3]), "peer": Timing(cpu=[0.4, 0.4, 0.4])}
@@ -58,10 +53,3 @@ def test_a_section_is_plain_data() -> None:
     again = json.loads(json.dumps(section().plain()))
     assert again["figures"][0]["name"] == "ours"
     assert again["growth"][0]["y"] == [9.0, 15.25]
-
-
-def test_the_picture_has_a_panel_for_each_unit_and_curve(tmp_path: Path) -> None:
-    write_picture([section()], tmp_path / "one.png")
-    write_picture([section(), section()], tmp_path / "two.png")
-    with Image.open(tmp_path / "one.png") as one, Image.open(tmp_path / "two.png") as two:
-        assert two.height > 1.5 * one.height

@@ -6,32 +6,26 @@ import pytest
 
 from benchmarks.speed.__main__ import SECTIONS
 from benchmarks.speed.accuracy import accuracy
-from benchmarks.speed.collector import collector
 from benchmarks.speed.end_to_end import end_to_end
 from benchmarks.speed.environment import environment
 from benchmarks.speed.identification import identification
 from benchmarks.speed.report import Section
 from benchmarks.speed.startup import startup
 from benchmarks.speed.update import update
-from benchmarks.speed.workbench import workbench
 from tactile_cube.simulation import SimulationOptions
 
 SMALL = {
     "environment": partial(environment, 1, peers=False, calls=1),
     "accuracy": partial(accuracy, {"fast": SimulationOptions()}, SimulationOptions(solver_iterations=60)),
     "update": partial(update, 1, peers=False, calls=1, hidden=16),
-    "collector": partial(collector, 1, worlds=(1, 2), processes=(1,), steps=2),
     "end_to_end": partial(end_to_end, 1, peers=False, worlds=2, steps=3, updates=1, hidden=16),
     "identification": partial(identification, 1, peers=False, duration=2.0, kinds=2, session=2.0, hidden=[()]),
     "startup": partial(startup, 1, commands=("--help",), trains=False),
-    "workbench": partial(workbench, 1, duration=2.0, moves=2, kinds=("ramps", "multisine")),
 }
 
 
 @pytest.mark.parametrize("name", SMALL)
 def test_a_section_gives_positive_figures_with_quartiles_in_order(name: str) -> None:
-    if name == "workbench":
-        pytest.importorskip("bokeh")
     section: Section = SMALL[name]()
     assert section.name == name
     assert section.figures

@@ -39,8 +39,9 @@ def test_a_finger_s_joint_stands_for_that_joint_of_every_finger() -> None:
 @pytest.mark.parametrize(
     ("name", "complaint"),
     [
-        ("striebeck_friction", r"'striebeck_friction' is unknown; did you mean stribeck_friction\? Use one of"),
-        ("stribeck", r"did you mean stribeck_friction\? Use one of"),
+        ("striebeck_friction", r"'striebeck_friction' is unknown; did you mean stribeck_friction\?$"),
+        ("stribeck", r"did you mean stribeck_friction\?$"),
+        ("quux", "'quux' is unknown; use one of command_dead_zone, rate_limit, .* or a dotted path"),
         ("no_such_rig.Drag", "whose code no file can have run"),
         ("tests.drivetrain.effects.laws.Nothing", "no subclass of Effect named 'Nothing'"),
         ("tests.drivetrain.effects.laws.NOT_AN_EFFECT", "no subclass of Effect"),

@@ -28,8 +28,8 @@ from tactile_cube.drivetrain.effects import (
     catalogue,
 )
 from tactile_cube.drivetrain.effects.command import RateLimit
+from tactile_cube.drivetrain.effects.effect import FINGER, Scales, unit_at
 from tactile_cube.drivetrain.effects.mechanism import Payload
-from tactile_cube.drivetrain.effects.scales import FINGER, Scales, unit_at
 from tactile_cube.drivetrain.effects.transmission import Elasticity, StiffeningElasticity
 from tactile_cube.drivetrain.signals import DAMPING, GAP, INERTIA, LOOP_GAIN, LOOSE_TORQUE, ROWS, SENSOR_VELOCITY
 

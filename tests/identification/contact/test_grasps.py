@@ -8,8 +8,7 @@ from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.writing import write_recording
 from tactile_cube.measurement.replay.hand_replay import ContactModel, HandReplay
-from tactile_cube.measurement.replay.model import Model
-from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.model import Model, nominal_model
 from tests.measurement.replay.test_hand_replay import source
 
 STATED, SLIPPERY = ContactModel({}), ContactModel({"spinning_friction": {"radius": 0.01}})

@@ -17,10 +17,10 @@ from tactile_cube.drivetrain.model_file import ModelFile, write_model
 from tactile_cube.errors import InputError
 from tactile_cube.export import main
 from tactile_cube.hand.mjcf import read_mjcf
-from tactile_cube.identification.export.joint_drive import drives_of
+from tactile_cube.identification.export import drives_of
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
-from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.model import nominal_model
 from tactile_cube.measurement.replay.simulator import free_run
 
 ARM = """<robot name="arm"><link name="base"/><link name="upper"><inertial><origin xyz="0.08 0 0"/><mass value="0.3"/>
@@ -202,6 +202,24 @@ def test_a_model_names_no_recording_outside_of_the_users_folder(
     with pytest.raises(InputError, match=said):
         tactile_cube.export_model("m.yaml", "mjcf")
     assert not list(Path().glob("*.xml"))
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ({"bam.volts": -3}, "bam.volts=-3: expected a number of volts above 0"),
+        ({"bam.volts": "many"}, "bam.volts=many: expected a number of volts above 0"),
+        ({"policy": "default"}, "policy=default: format=bam is of a model; leave one of them out"),
+        ({"output": "."}, r"^output=\.: is a folder; name a file$"),
+    ],
+)
+def test_a_wrong_setting_writes_no_file(
+    settings: dict[str, object], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match=said):
+        tactile_cube.export_model(model(), "bam", values={"bam.actuator": "sts3215", **settings})
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_format_without_a_model_is_no_policys(

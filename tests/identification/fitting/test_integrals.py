@@ -7,10 +7,8 @@ import numpy as np
 import pytest
 
 from tactile_cube.drivetrain.effects import find_effect
-from tactile_cube.identification.fitting.problem import Problem
-from tactile_cube.identification.fitting.shooting import Shooting
-from tactile_cube.measurement.replay.model import Model, Term
-from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.identification.fitting.problem import Problem, Shooting
+from tactile_cube.measurement.replay.model import Model, Term, nominal_model
 from tactile_cube.measurement.replay.simulator import integrated
 from tests.identification.rigs_of_any_size import EFFECTS, NOISE, Size, simulated
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from statsmodels.api import OLS
 
-from tactile_cube.identification.fitting.intervals import standard_errors
+from tactile_cube.identification.fitting.resolution import standard_errors
 from tactile_cube.identification.fitting.unknowns import Unknown
 
 SEGMENTS, ROWS = 30, 40

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from tactile_cube.drivetrain.effects.catalogue import catalogue
-from tactile_cube.identification.fitting.shooting import Shooting
+from tactile_cube.identification.fitting.problem import Shooting
 from tactile_cube.identification.search.candidates import candidates
 from tactile_cube.identification.search.search import some
 from tactile_cube.measurement.comparing.noise_floor import noise_with_links
 from tactile_cube.measurement.recordings.reading import read_recording
-from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.model import nominal_model
 
 SHARED = Path(__file__).parents[4] / "shared" / "recordings" / "finger_friction"
 

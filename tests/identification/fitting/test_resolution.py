@@ -7,11 +7,11 @@ import pytest
 
 from tactile_cube.drivetrain.effects import catalogue
 from tactile_cube.identification.fitting import resolution
+from tactile_cube.identification.fitting.problem import Shooting
 from tactile_cube.identification.fitting.resolution import resolved, step_error
-from tactile_cube.identification.fitting.shooting import Shooting
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.model import nominal_model
 from tests.measurement.small_rig import write
 
 EFFECTS = tuple(catalogue().values())  # one kernel is compiled for all tests

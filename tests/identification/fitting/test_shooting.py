@@ -10,12 +10,10 @@ import pytest
 from tactile_cube.drivetrain.effects import catalogue
 from tactile_cube.drivetrain.effects.command import CommandDelay
 from tactile_cube.drivetrain.effects.transmission import Backlash
-from tactile_cube.identification.fitting.problem import Problem, with_initial_states
-from tactile_cube.identification.fitting.shooting import Shooting
+from tactile_cube.identification.fitting.problem import Problem, Shooting, with_initial_states
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.model import Model, Term
-from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.model import Model, Term, nominal_model
 from tactile_cube.measurement.replay.simulator import free_run
 from tactile_cube.measurement.replay.windows import Windows, cut
 from tests.measurement.small_rig import write

@@ -7,14 +7,12 @@ import numpy as np
 import pytest
 
 from tactile_cube.drivetrain.effects import catalogue
-from tactile_cube.identification.fitting.intervals import bounds, final_fit
-from tactile_cube.identification.fitting.problem import Problem
-from tactile_cube.identification.fitting.resolution import FINER, finer
-from tactile_cube.identification.fitting.shooting import Shooting
+from tactile_cube.identification.fitting.problem import Problem, Shooting
+from tactile_cube.identification.fitting.resolution import FINER, bounds, final_fit, finer
 from tactile_cube.identification.fitting.unknowns import base_unknowns, read_all
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.model import nominal_model
 from tactile_cube.measurement.replay.windows import Windows, cut
 from tests.measurement.small_rig import write
 

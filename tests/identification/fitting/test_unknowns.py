@@ -7,7 +7,7 @@ import pytest
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile
 from tactile_cube.identification.search.candidates import model_unknowns
 from tactile_cube.measurement.recordings.reading import read_recording
-from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.model import nominal_model
 from tests.measurement.small_rig import write
 
 

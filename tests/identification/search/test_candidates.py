@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tactile_cube.drivetrain.effects import catalogue, find_effect
-from tactile_cube.drivetrain.effects.scales import FINGER, Scales
+from tactile_cube.drivetrain.effects.effect import FINGER, Scales
 from tactile_cube.identification.search.candidates import (
     Candidate,
     Score,

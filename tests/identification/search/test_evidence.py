@@ -11,6 +11,7 @@ from tactile_cube.identification.search.evidence import (
     charged,
     correlation_length,
     in_blocks,
+    lacking,
     likelihood,
     p_value,
     worse,
@@ -86,3 +87,21 @@ def test_trials_in_which_nothing_moves_do_not_hide_what_the_others_show() -> Non
     after = replace(before, costs=before.costs - difference, trial=trial)
     assert p_value(before, after) < 1e-4
     assert p_value(before, replace(after, costs=before.costs - 0.002 * difference)) > 1e-3, "slight everywhere"
+
+
+def test_segments_at_rest_in_which_a_model_rests_too_are_no_infinite_proof() -> None:
+    before = judged(20.0)
+    resting = np.arange(60) < 10
+    after = replace(before, costs=np.where(resting, 0.0, before.costs / 9.0))
+    assert np.isfinite(likelihood(before, after)).all()
+    assert p_value(before, after) < 1e-6, "the sixth that rests hides nothing of what the others prove"
+    assert likelihood(before, after)[resting].max() < 10.0 * likelihood(before, after)[~resting].max()
+
+
+def test_what_a_larger_set_proves_a_smaller_one_lacks() -> None:
+    less = judged(10.0)
+    scatter = 1.0 + 0.1 * np.random.default_rng(0).normal(size=60)
+    assert lacking(less, replace(less, costs=less.costs * 0.89 * scatter)), "a tenth, and steadily"
+    assert not lacking(less, replace(less, costs=less.costs * 0.97)), "below the price of an effect"
+    once = np.where(np.arange(60) < 3, 0.01, 1.0)
+    assert not lacking(less, replace(less, costs=less.costs * once)), "three segments of sixty"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tactile_cube.drivetrain.effects import ANGLE, JOINT_TORQUE, find_effect
-from tactile_cube.drivetrain.effects.scales import FINGER
+from tactile_cube.drivetrain.effects.effect import FINGER
 from tactile_cube.drivetrain.signals import ROWS
 from tactile_cube.identification.search.candidates import forms
 from tactile_cube.identification.search.residual_shape import Missing

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from tactile_cube.drivetrain.effects import catalogue
-from tactile_cube.drivetrain.effects.scales import FINGER
+from tactile_cube.drivetrain.effects.effect import FINGER
 from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.search.findings import common_offsets, shared_offset
 from tactile_cube.measurement.replay.model import Model

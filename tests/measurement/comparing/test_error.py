@@ -15,7 +15,7 @@ from tactile_cube.measurement.comparing.error import (
 )
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.model import nominal_model
 from tactile_cube.measurement.replay.simulator import Simulator, free_run
 from tests.measurement.small_rig import write
 

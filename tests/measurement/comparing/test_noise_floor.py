@@ -4,8 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tactile_cube.measurement.comparing.noise_floor import noise_floor, sensor_noise
-from tactile_cube.measurement.comparing.repeats import aligned_repeats
+from tactile_cube.measurement.comparing.noise_floor import aligned_repeats, noise_floor, sensor_noise
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tests.measurement.small_rig import setting, table, write

@@ -12,7 +12,7 @@ from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.writing import write_recording
 from tactile_cube.measurement.replay.hand_replay import ContactModel, HandReplay, contact_of
-from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.model import nominal_model
 from tactile_cube.measurement.replay.simulator import Simulator
 from tactile_cube.measurement.sources.simulated_grasp import SimulatedGrasp
 

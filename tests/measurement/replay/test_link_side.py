@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 
 from tactile_cube.errors import InputError
-from tactile_cube.identification.fitting.problem import Problem
-from tactile_cube.identification.fitting.shooting import Shooting
+from tactile_cube.identification.fitting.problem import Problem, Shooting
 from tactile_cube.identification.fitting.unknowns import Unknown
 from tactile_cube.measurement.comparing.noise_floor import noise_with_links
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.model import nominal_model
 from tactile_cube.measurement.replay.simulator import free_run
 from tests.measurement.small_rig import Table, write
 

@@ -14,8 +14,7 @@ from tactile_cube.measurement.comparing.error import free_run_error
 from tactile_cube.measurement.recordings.description import KnownForce
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.model import Model, Term
-from tactile_cube.measurement.replay.nominal import draw_model, nominal_model, require_same_joints
+from tactile_cube.measurement.replay.model import Model, Term, draw_model, nominal_model, require_same_joints
 from tactile_cube.measurement.replay.simulator import Simulator, force_torque, free_run
 from tactile_cube.measurement.replay.windows import cut
 from tests.measurement.small_rig import write

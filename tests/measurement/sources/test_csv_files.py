@@ -211,6 +211,8 @@ def change_goal(frame: Frame) -> Frame:
         ({"columns": COLUMNS | {"a": {"command": "goal1"}}}, dict, r"source\.columns\.a: position missing"),
         ({"columns": COLUMNS | {"c": COLUMNS["a"]}}, dict, r"source\.columns\.c: no such joint.*a, b"),
         ({"columns": COLUMNS | {"a": {"command": "goal1", "position": "pos1", "load": "x"}}}, dict, "a.load: unknown"),
+        ({"columns": {"a": "goal1"}}, dict, r"source\.columns\.a=goal1: no mapping; expected source\.columns='{time"),
+        ({"angle_unit": "range", "calibration": "no.json"}, dict, r"^no\.json: no such file$"),
         ({"angle_unit": "grad"}, dict, r"source\.angle_unit=grad: unknown; choose one of rad, deg"),
         ({"kind": ["one", "two"]}, dict, "2 values for 1 files"),
         (

@@ -115,6 +115,12 @@ def test_guesses_a_third_off_are_fitted_back_to_the_noise(tmp_path: Path) -> Non
         ({"robot": "wheel", "gain": 16}, "source.gain=16: is that of source.servo=NAME, which is not given"),
         ({"robot": "wheel", "rate": "fast"}, "source.rate=fast: expected a valid number"),
         ({"robot": "wheel", "gravity": 9.81}, "source.gravity=9.81: expected a valid tuple"),
+        ({"robot": "wheel", "gravity": [0.0, 0.0]}, r"source.gravity=\[0.0, 0.0\]: expected more values"),
+        ({"robot": "wheel", "resolution": -1.0}, "source.resolution=-1.0: expected greater than or equal to 0"),
+        (
+            {"robot": "wheel", "controller": {"kt": 0.1}},
+            "controller.mode=position: kt and R are of mode=voltage",
+        ),
         ({"robot": "wheel", "read": "behind"}, "source.read=behind: expected 'before' or 'after'"),
         ({"robot": "wheel", "controller": {"kp": "abc"}}, "source.controller.kp=abc: expected a valid number"),
         ({"robot": "wheel", "length": -1}, "source.length=-1: expected greater than 0"),
@@ -137,7 +143,11 @@ def test_constants_of_a_servo_are_stated_where_nobody_says_others(tmp_path: Path
     assert float(recording.gains.torque_limit[0]) == pytest.approx(0.97 * stall, rel=1e-3)
     assert recording.gains.kd.tolist() == [0.3]
     assert recording.nominal["reflected_inertia"].tolist() == [0.0261]
-    assert "kd" not in recording.description.unknown
+    assert recording.description.unknown == ["reflected_inertia", "mass"]
+    weighed = imported(
+        tmp_path / "weighed", played("pendulum"), robot="pendulum", mass=0.4, servo="sts3215", controller={}
+    )
+    assert weighed.description.unknown == ["kp", "kd", "reflected_inertia"]
 
 
 def test_the_gain_of_the_firmware_counts() -> None:

@@ -49,10 +49,8 @@ def find_effect(name: str) -> EffectClass:
     if "@" in name:
         raise InputError(f"effect '{name}': name no joint here, all are asked about; `identify` fits one at a joint")
     if "." not in name:
-        raise InputError(
-            f"effect '{name}' is unknown{suggestion(name, catalogue()) or '.'} Use one of {', '.join(catalogue())}, "
-            "or a dotted path to your own class"
-        )
+        every = f"; use one of {', '.join(catalogue())}, or a dotted path to your own class"
+        raise InputError(f"effect '{name}' is unknown{suggestion(name, catalogue()) or every}")
     return _own_effect(name)
 
 

@@ -2,8 +2,7 @@
 
 from math import ceil, exp
 
-from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
-from tactile_cube.drivetrain.effects.scales import Scales
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Scales, Stage
 from tactile_cube.drivetrain.signals import (
     COMMAND,
     CONTROLLER_TORQUE,

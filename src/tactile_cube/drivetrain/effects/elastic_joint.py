@@ -4,8 +4,7 @@ from math import pi
 from typing import ClassVar
 
 from tactile_cube.compiled import compiled
-from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Simpler, Stage
-from tactile_cube.drivetrain.effects.scales import Scales
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Scales, Simpler, Stage
 from tactile_cube.drivetrain.signals import (
     ACCELERATION,
     DAMPING,

@@ -4,8 +4,7 @@ from dataclasses import replace
 from math import exp, inf
 from typing import ClassVar
 
-from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Simpler, Stage
-from tactile_cube.drivetrain.effects.scales import Scales
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Scales, Simpler, Stage
 from tactile_cube.drivetrain.signals import DAMPING, DIRECTION, FRICTION, JOINT_TORQUE, TIME, TORQUE, VELOCITY
 
 

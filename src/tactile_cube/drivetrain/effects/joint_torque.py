@@ -3,8 +3,7 @@
 from math import isfinite, tanh
 from typing import ClassVar
 
-from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Simpler, Stage
-from tactile_cube.drivetrain.effects.scales import Scales, unit_at
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Scales, Simpler, Stage, unit_at
 from tactile_cube.drivetrain.signals import ANGLE, DAMPING, JOINT_TORQUE, POSITION, VELOCITY
 
 

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Place, Stage, View
-from tactile_cube.drivetrain.effects.scales import Scales
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Place, Scales, Stage, View
 
 
 class ReflectedInertia(Effect):

@@ -6,8 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Simpler, Stage, harmonic
-from tactile_cube.drivetrain.effects.scales import Scales, unit_at
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Scales, Simpler, Stage, harmonic, unit_at
 from tactile_cube.drivetrain.signals import ACCELERATION, ANGLE, DAMPING, JOINT_TORQUE, TORQUE, VELOCITY
 
 

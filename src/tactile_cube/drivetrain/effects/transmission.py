@@ -7,8 +7,17 @@ from typing import ClassVar
 import numpy as np
 
 from tactile_cube.compiled import compiled
-from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Place, Simpler, Stage, View, harmonic
-from tactile_cube.drivetrain.effects.scales import Scales
+from tactile_cube.drivetrain.effects.effect import (
+    Array,
+    Effect,
+    Parameter,
+    Place,
+    Scales,
+    Simpler,
+    Stage,
+    View,
+    harmonic,
+)
 from tactile_cube.drivetrain.signals import (
     ACCELERATION,
     ANGLE,

@@ -184,7 +184,7 @@ def look_ahead(
 
 @compiled
 def start_segment(position: Array, speed: Array, free: Array, trial: Array, memory: Array) -> None:
-    """Puts the sensor to its measured position and speed; effects keep their past.
+    """Put the sensor to its measured position and speed; effects keep their past.
 
     `trial` has made the coming step already, which says how far the sensor is from the joint and how fast it leaves it.
     A joint that is `free` of its sensor around the start goes on as it was.
@@ -199,7 +199,7 @@ def start_segment(position: Array, speed: Array, free: Array, trial: Array, memo
 
 @compiled
 def move(by: Array, memory: Array) -> None:
-    """Moves all joints by so much, in position and in speed."""
+    """Move all joints by so much, in position and in speed."""
     for a in range(C * n):
         memory[plant.Q + a] += by[a]
         memory[plant.V + a] += by[C * n + a]

@@ -5,8 +5,6 @@ So every value of a contact effect is judged with the offsets and the place of t
 from zero: what suits another value would pull the answer to where the search began.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
@@ -26,8 +24,7 @@ from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, sensor_no
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
 from tactile_cube.measurement.replay.hand_replay import ContactModel, HandReplay, contact_of
-from tactile_cube.measurement.replay.model import Model, Term
-from tactile_cube.measurement.replay.nominal import nominal_model, require_same_joints
+from tactile_cube.measurement.replay.model import Model, Term, nominal_model, require_same_joints
 from tactile_cube.measurement.replay.simulator import Simulated
 from tactile_cube.measurement.split import held_out_split
 from tactile_cube.simulation.contact_effects import ContactEffect, contact_catalogue

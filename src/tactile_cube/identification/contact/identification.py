@@ -1,7 +1,5 @@
 """Effects of fingertips and object: those that a user names fitted, and those that a model lacks searched for."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -10,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from tactile_cube.drivetrain.effects.scales import FINGER
+from tactile_cube.drivetrain.effects.effect import FINGER
 from tactile_cube.drivetrain.model_file import EffectEstimate, ModelErrors, ModelFile
 from tactile_cube.errors import InputError
 from tactile_cube.identification.contact.grasps import (
@@ -25,7 +23,7 @@ from tactile_cube.identification.contact.grasps import (
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.diagnosis_json import effect_entries, names_of, ranking
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit, precision
-from tactile_cube.identification.fitting.intervals import Fitted, bounds, standard_errors
+from tactile_cube.identification.fitting.resolution import Fitted, bounds, standard_errors
 from tactile_cube.identification.model_files import effect_estimate
 from tactile_cube.identification.search.candidates import Candidate, model_unknowns, without_effect
 from tactile_cube.identification.search.evidence import gain, p_value, worse
@@ -47,7 +45,7 @@ STEPS, LAST_STEPS = 3, 2  # of Gauss-Newton, of a set in a search and of the las
 FINER = 2  # trials of each kind that tell what shorter steps of the world change
 SINGLES, MOST = 3, 3  # laws of each round that are refitted on more trials; effects of a set
 SURER: tuple[Kind, ...] = ("unknown_effect", "partly_explained", "ambiguous", "missing_effect", "adequate")
-"""Verdicts, the one that leaves most open first."""
+"""Verdicts, least certain first."""
 
 
 def stepped(problem: Grasps, parent: Model, effect: type[ContactEffect]) -> tuple[Candidate, Fit]:

@@ -1,7 +1,5 @@
 """Bounded Levenberg-Marquardt on the marginal likelihood of a multiple-shooting problem."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -60,21 +58,24 @@ def fit(
         unknowns: what to fit; with `frozen`, beside its unknowns; none beside them is the chord method.
         iterations: most steps that are taken.
         frozen: a fit whose columns are kept as they are, which spares simulating them; they change little.
-        converged: relative gain of a step below which the fit ends.
+        converged: relative gain of a step, made or promised, below which the fit ends.
     """
     everything = (*(frozen.unknowns if frozen else ()), *unknowns)
     best = _linearised(problem, model, unknowns, everything, frozen)
     damping = DAMPING
     for iteration in range(iterations):
         weight = noise_inflation(problem, best.cost)
+        reached = best.cost + weight * best.prior_penalty
         for _ in range(SHORTER):
-            tried = _evaluated(problem, best, _stepped(problem, best, weight, damping))
-            if tried.cost + weight * tried.prior_penalty < best.cost + weight * best.prior_penalty:
+            stepped, promised = _stepped(problem, best, weight, damping)
+            if promised < converged * reached:
+                return best
+            tried = _evaluated(problem, best, stepped)
+            if tried.cost + weight * tried.prior_penalty < reached:
                 break
             damping *= 10.0
         else:
-            return best  # no step is too short to fail where a fit has converged
-        reached = best.cost + weight * best.prior_penalty
+            return best
         gain = (reached - tried.cost - weight * tried.prior_penalty) / max(reached, 1e-9)
         damping *= 0.3
         best = tried
@@ -110,10 +111,10 @@ def _evaluated(problem: Problem, near: Fit, model: Model) -> Fit:
 
 
 def noise_inflation(problem: Problem, cost: float) -> float:
-    """Weight of what is expected beforehand.
+    """Return the weight of the prior.
 
-    While the model is wrong its error is far above the noise and remembers itself; taking it for white noise would let
-    the constants soak it up. So expectations weigh as much more as the error is larger and longer than noise.
+    While the model is wrong its error is far above the noise and autocorrelated; treated as white noise it would bias
+    the constants. So the prior counts as many times more as the error is larger and longer than noise.
     """
     excess = cost / max(float(np.count_nonzero(problem.weight)), 1.0) - 1.0
     return 1.0 + CORRELATED * max(excess, 0.0)
@@ -140,8 +141,11 @@ def _information(problem: Problem, columns: Array) -> Array:
     return np.asarray(np.einsum("grp,grq->pq", columns, problem.free(columns), optimize=True))
 
 
-def _stepped(problem: Problem, fitted: Fit, trust: float, damping: float) -> Model:
-    """Damped Gauss-Newton step; an unknown that would leave its bounds stops there and the others are solved anew."""
+def _stepped(problem: Problem, fitted: Fit, trust: float, damping: float) -> tuple[Model, float]:
+    """Damped Gauss-Newton step, and by how much it promises to lower the cost with its weighted penalty.
+
+    An unknown that would leave its bounds stops there and the others are solved anew.
+    """
     values = read_all(fitted.model, fitted.unknowns)
     scale, centre, low, high = (
         np.array([getattr(u, key) for u in fitted.unknowns]) for key in ("scale", "centre", "low", "high")
@@ -151,7 +155,8 @@ def _stepped(problem: Problem, fitted: Fit, trust: float, damping: float) -> Mod
     gradient = pull - weight * (values - centre) / scale
     information = fitted.information + np.diag(weight)
     step = bounded_step(information, gradient, damping, (low - values) / scale, (high - values) / scale)
-    return put_all(fitted.model, fitted.unknowns, values + step * scale)
+    promised = float(2.0 * gradient @ step - step @ information @ step)
+    return put_all(fitted.model, fitted.unknowns, values + step * scale), promised
 
 
 def bounded_step(information: Array, gradient: Array, damping: float, least: Array, most: Array) -> Array:

@@ -9,8 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.drivetrain.effects.effect import Effect, Parameter
-from tactile_cube.drivetrain.effects.scales import FINGER, Scales
+from tactile_cube.drivetrain.effects.effect import FINGER, Effect, Parameter, Scales
 from tactile_cube.identification.fitting.gauss_newton import Fit, noise_inflation, precision
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.unknowns import Unknown

@@ -12,16 +12,14 @@ from scipy.stats import t as student_t
 
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.gauss_newton import fit
-from tactile_cube.identification.fitting.intervals import NORMAL_95
-from tactile_cube.identification.fitting.problem import Problem
-from tactile_cube.identification.fitting.shooting import Shooting
+from tactile_cube.identification.fitting.problem import Problem, Shooting
+from tactile_cube.identification.fitting.resolution import NORMAL_95
 from tactile_cube.identification.fitting.unknowns import offset_unknowns
 from tactile_cube.measurement.comparing.error import CORRELATED, free_run_error
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model
 
 Array = NDArray[np.float64]
-TINY = np.finfo(float).tiny
 FEWEST_BLOCKS = 5  # that a scatter is told from
 SLIGHT = 1.0  # [sensor variance] what a number that follows noise alone gains in a segment, in the mean
 FEWEST_PAIRS = 10  # of segments so far apart, that an autocorrelation needs
@@ -79,6 +77,11 @@ def charged(costs: Array, samples: NDArray[np.int64], numbers: NDArray[np.int64]
     return np.asarray(costs + excess * ((independent / (independent - numbers)) ** 2 - 1.0))
 
 
+def joint_squares(problem: Problem, residual: Array) -> Array:
+    """Squared residuals (n,) of each joint's sensors, in units of the noise, with the starts of segments taken out."""
+    return np.asarray(np.maximum(_joint_squares(problem, residual)[0].sum(axis=0), 0.0))
+
+
 def joint_errors(problem: Problem, residual: Array) -> Array:
     """RMS (n,) of the residual of each joint's sensors with the starts of segments taken out."""
     squares, present = _joint_squares(problem, residual)
@@ -122,13 +125,21 @@ def worse(other: Judgement, best: Judgement, criteria: Criteria = STANDARD) -> b
     return bool(difference.sum() > allowed and standing_out(likelihood(other, best), best) > criteria.band)
 
 
+def lacking(less: Judgement, more: Judgement, criteria: Criteria = STANDARD) -> bool:
+    """Whether held-out trials prove what one set has beyond another that it contains.
+
+    It is no law in the place of another, that might differ in detail: it has to earn its price, beyond its scatter.
+    """
+    return gain(less, more) > criteria.least_gain and standing_out(likelihood(less, more), more) > criteria.band
+
+
 def likelihood(before: Judgement, after: Judgement) -> Array:
     """Twice the log likelihood (G,) that each segment gains by the second model, the size of its errors unknown.
 
     At the noise that is the difference of squared errors; far from it, ratios count, so that no single segment decides.
+    The sensor's variance counts as one sample more: else a joint that rests as its model does were infinitely likely.
     """
-    ratio = np.maximum(before.costs, TINY) / np.maximum(after.costs, TINY)
-    return np.asarray(before.samples * np.log(ratio))
+    return np.asarray((before.samples + 1.0) * np.log((1.0 + before.costs) / (1.0 + after.costs)))
 
 
 def standing_out(difference: Array, judged: Judgement) -> float:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.search.candidates import Candidate
-from tactile_cube.identification.search.evidence import Judgement, worse
+from tactile_cube.identification.search.evidence import Judgement, gain, lacking, worse
 
 
 @dataclass(frozen=True)
@@ -64,6 +64,18 @@ def simplest(found: Sequence[Explanation], criteria: Criteria = STANDARD) -> Exp
     best = min(found, key=lambda e: e.judgement.costs.sum())
     equal = [e for e in found if not worse(e.judgement, best.judgement, criteria)]
     return min(equal, key=lambda e: (len(named(e)), e.size, e.judgement.costs.sum()))
+
+
+def sound(found: Sequence[Explanation], criteria: Criteria = STANDARD) -> list[Explanation]:
+    """Explanations of which sets that differ from them by whole effects show none as missing and none as needless."""
+    return [
+        one
+        for one in found
+        if not any(named(one) < named(more) and lacking(one.judgement, more.judgement, criteria) for more in found)
+        and not any(
+            named(less) < named(one) and gain(less.judgement, one.judgement) < criteria.least_gain for less in found
+        )
+    ]
 
 
 def contains(richer: Explanation, simple: Explanation) -> bool:

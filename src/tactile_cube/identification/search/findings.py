@@ -11,7 +11,7 @@ from scipy.stats import t as student_t
 
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.identification.criteria import STANDARD, Criteria
-from tactile_cube.identification.fitting.intervals import NORMAL_95, standard_errors
+from tactile_cube.identification.fitting.resolution import NORMAL_95, standard_errors
 from tactile_cube.identification.search.candidates import Candidate, Score, Sizes, first_term
 from tactile_cube.identification.search.evidence import Judgement, worse
 from tactile_cube.identification.search.explanation import (
@@ -20,6 +20,7 @@ from tactile_cube.identification.search.explanation import (
     named_by,
     proven,
     simplest,
+    sound,
     unproven,
 )
 from tactile_cube.identification.search.proposals import (
@@ -90,7 +91,7 @@ def find(search: Search) -> Findings:
         return Findings(base, nominal, (shared,) if shared else ())
     search.stand(f"constants refitted ({base.error:.2f} x sensor noise on held-out trials)", "every law by itself")
     way, first = proposed(search)
-    looked = max(len(first.tried), 1) if first else 1  # starts of one law are no other law
+    looked = max(first.laws, 1) if first else 1
     found = Findings(
         base,
         nominal,
@@ -99,7 +100,7 @@ def find(search: Search) -> Findings:
         looked,
     )
     if first and (good := found.proven(search.criteria)):
-        chosen = simplest(good, search.criteria)
+        chosen = simplest(sound(good, search.criteria), search.criteria)
         search.stand(f"{chosen.label} ({chosen.error:.2f} x sensor noise on held-out trials)", "its possible twins")
         others = tuple(search.explained(one, looked) for one in twins(search, chosen, first, found.judged))
         found = replace(found, judged=(*found.judged, *others))
@@ -119,7 +120,7 @@ def proposed(search: Search) -> tuple[list[Proposal], Looks | None]:
         first = first or looks
         if not looks.tried:
             break
-        search.say(f"{len(looks.scores)} starts of {len(looks.tried)} laws beside {parent.label}")
+        search.say(f"{len(looks.scores)} starts of {looks.laws} laws beside {parent.label}")
         tried = [one for one in grown(search, looks) if laws_of(one) <= MOST]
         tried += [richer for richer in (detailed(search, one) for one in tried[:1]) if richer]
         tried.sort(key=lambda one: one.price(search.criteria))

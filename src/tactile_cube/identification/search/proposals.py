@@ -21,14 +21,15 @@ from tactile_cube.identification.search.candidates import (
     with_details,
     without_effect,
 )
-from tactile_cube.identification.search.evidence import joint_errors
+from tactile_cube.identification.search.evidence import joint_errors, joint_squares
 from tactile_cube.identification.search.explanation import Proposal, named_by
 from tactile_cube.identification.search.residual_starts import residual_candidates
 from tactile_cube.identification.search.search import Search, some
 
 Array = NDArray[np.float64]
 LOOKED_AT = 4  # part of the segments to judge by, on which every law gets its own steps
-STEPS = 2  # of Gauss-Newton that every law gets
+PROMISING = 0.01  # of its joint's squared error: what a law promises less than at first has never come to a fifth of it
+STEPS = 2  # of Gauss-Newton that every other law gets
 MORE_STEPS = 6  # that a law gets which may be a twin of the chosen one
 SINGLES, SETS = 4, 3  # laws, and sets of several, that are refitted exactly
 CLOSE = 2.5  # squared error over the best one's up to which another law may do as well when everything is free
@@ -42,8 +43,8 @@ class Looks:
         parent: the set.
         problem: few windows.
         frozen: its fit there.
-        tried: laws with their fits there, best first.
-        scores: the first look, best first.
+        tried: laws that promise something, with their fits there, best first.
+        scores: the first look at every law, best first.
     """
 
     parent: Proposal
@@ -51,6 +52,11 @@ class Looks:
     frozen: Fit = field(repr=False)
     tried: list[tuple[Candidate, Fit]] = field(repr=False)
     scores: list[Score] = field(repr=False)
+
+    @property
+    def laws(self) -> int:
+        """How many laws were looked at: starts of one law are no other law."""
+        return len({key(score.candidate) for score in self.scores})
 
 
 def off(search: Search, one: Fit) -> list[int]:
@@ -66,7 +72,7 @@ def off(search: Search, one: Fit) -> list[int]:
 
 
 def look(search: Search, parent: Proposal, at: Sequence[str]) -> Looks:
-    """Every law at these joints gets its own steps beside a set that is fitted."""
+    """Every law at these joints that promises something gets its own steps beside a set that is fitted."""
     problem = Problem(search.shooting, some(search.all_windows, search.segments // LOOKED_AT))
     problem.linearise_starts(parent.fit.model)
     frozen = renewed(problem, parent.fit, *problem.columns(parent.fit.model, parent.fit.unknowns))
@@ -77,7 +83,9 @@ def look(search: Search, parent: Proposal, at: Sequence[str]) -> Looks:
         if there.isdisjoint(named_by([one])) and (one.joints[0] in at or one.effect.stage is Stage.MECHANISM)
     ]
     scores = screen(problem, frozen, possible)
-    tried = sorted((stepped(problem, frozen, one) for one in best_starts(scores)), key=lambda pair: pair[1].cost)
+    squares = dict(zip(search.fitted.joints, joint_squares(problem, frozen.residual), strict=True))
+    promising = [one for one in scores if one.gain > PROMISING * min(squares[joint] for joint in one.candidate.joints)]
+    tried = sorted((stepped(problem, frozen, one) for one in best_starts(promising)), key=lambda pair: pair[1].cost)
     return Looks(parent, problem, frozen, tried, scores)
 
 
@@ -96,9 +104,13 @@ def best_starts(scores: Sequence[Score]) -> list[Candidate]:
     """Of every law in every form at every joint the start that promises most, as large as it promises."""
     starts: dict[tuple[str, tuple[str, ...], tuple[str, ...]], list[Score]] = {}
     for score in scores:
-        key = (score.candidate.effect.name, tuple(score.candidate.form), score.candidate.joints)
-        starts.setdefault(key, []).append(score)
-    return [resized(start(same) if same[0].gain > 0.0 else same[0]) for same in starts.values()]
+        starts.setdefault(key(score.candidate), []).append(score)
+    return [resized(start(same)) for same in starts.values()]
+
+
+def key(candidate: Candidate) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
+    """A law in a form at its joints."""
+    return candidate.effect.name, tuple(candidate.form), candidate.joints
 
 
 def grown(search: Search, looks: Looks) -> list[Proposal]:

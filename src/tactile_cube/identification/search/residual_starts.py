@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.drivetrain.effects.effect import Effect, Stage
-from tactile_cube.drivetrain.effects.scales import Scales
+from tactile_cube.drivetrain.effects.effect import Effect, Scales, Stage
 from tactile_cube.drivetrain.signals import ANGLE, JOINT_TORQUE, ROWS
 from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.fitting.problem import Problem

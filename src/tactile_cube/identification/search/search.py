@@ -14,15 +14,13 @@ from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit, renewed
-from tactile_cube.identification.fitting.problem import Problem
-from tactile_cube.identification.fitting.shooting import Shooting
+from tactile_cube.identification.fitting.problem import Problem, Shooting
 from tactile_cube.identification.fitting.unknowns import Unknown, base_unknowns, every_effect
 from tactile_cube.identification.search.candidates import Candidate, candidates, model_unknowns
 from tactile_cube.identification.search.evidence import HeldOut, Judgement, gain, judge, p_value
 from tactile_cube.identification.search.explanation import Explanation, Proposal
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.model import Model
-from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.model import Model, nominal_model
 from tactile_cube.measurement.replay.windows import Windows
 
 Array = NDArray[np.float64]

@@ -22,8 +22,7 @@ from tactile_cube.measurement.comparing.regimes import (
     whiteness,
 )
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.model import Model
-from tactile_cube.measurement.replay.nominal import draw_model, nominal_model, require_same_joints
+from tactile_cube.measurement.replay.model import Model, draw_model, nominal_model, require_same_joints
 from tactile_cube.measurement.replay.simulator import Simulated, Simulator, free_run
 
 Array = NDArray[np.float64]
@@ -186,8 +185,8 @@ def describe_comparison(
         floor=floor,
         regimes=table,
         sentences=[
-            *where_it_fails(table, summary.joints, floor, recording.units),
-            *(one.sentence(recording.units[one.joint]) for one in floor.drift),
+            *where_it_fails(table, summary.joints, floor, recording.shown),
+            *(one.sentence(recording.shown[one.joint]) for one in floor.drift),
         ],
         whiteness=whiteness(trials, errors, joints),
         failing_intervals=[

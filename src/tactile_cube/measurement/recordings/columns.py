@@ -15,27 +15,20 @@ Array = NDArray[np.float64]
 MINIMUM_SAMPLES = 20
 SIGNALS = ("command", "position", "torque", "link_position", "feedforward")
 """Of a joint; command and position it must have."""
+OF_SOME = {"link_position": np.nan, "feedforward": 0.0}
+"""Signals that some joints may have, and what stands for those of the others."""
 
 
 @dataclass(frozen=True)
 class TrialColumns:
-    """What was commanded and measured; `sensors.read` of the recording says when `position[k]` was read.
+    """What was commanded and measured; `sensors.read` of the recording says when `position[k]` was read."""
 
-    Attributes:
-        time: (n,) [s].
-        command: (n, joints) desired position [rad] ([N m] where the controller's mode is `torque`).
-        position: (n, joints) measured position, on the motor side [rad].
-        torque: (n, joints) measured torque [N m], or None.
-        link_position: (n, joints) measured on the link side [rad], nan where a joint has no sensor there; or None.
-        feedforward: (n, joints) torque that the controller added to its own [N m], acting like `command`; or None.
-    """
-
-    time: Array
-    command: Array
-    position: Array
-    torque: Array | None = None
-    link_position: Array | None = None
-    feedforward: Array | None = None
+    time: Array  # (n,) [s]
+    command: Array  # (n, joints) desired position [rad] ([N m] where the controller's mode is `torque`)
+    position: Array  # (n, joints) measured position, on the motor side [rad]
+    torque: Array | None = None  # (n, joints) measured torque [N m]
+    link_position: Array | None = None  # (n, joints) measured on the link side [rad], nan where a joint has no sensor
+    feedforward: Array | None = None  # (n, joints) torque that the controller added to its own [N m], like `command`
 
 
 def pick_columns(table: Table, joints: tuple[str, ...], path: Path) -> tuple[TrialColumns, list[str]]:
@@ -56,39 +49,18 @@ def pick_columns(table: Table, joints: tuple[str, ...], path: Path) -> tuple[Tri
             f"{path}: column 'time' has {samples} samples, last row {samples - 1}; a trial needs at least "
             f"{MINIMUM_SAMPLES}: record it again or remove it from recording.yaml"
         )
-    torque, torque_warnings = _torque(table, joints, path)
-    columns = TrialColumns(
-        _finite(table, "time", path),
-        _stack(table, joints, "command", path),
-        _stack(table, joints, "position", path),
-        torque,
-        _of_some(table, joints, "link_position", np.nan, path),
-        _of_some(table, joints, "feedforward", 0.0, path),
-    )
-    return columns, warnings + torque_warnings
-
-
-def _torque(table: Table, joints: tuple[str, ...], path: Path) -> tuple[Array | None, list[str]]:
-    names = [f"{joint}.torque" for joint in joints]
-    lacking = [name for name in names if name not in table or np.isnan(table[name]).all()]
-    if not lacking:
-        return _stack(table, joints, "torque", path), []
-    if len(lacking) == len(names):
-        return None, []
-    return None, [f"{path}: column '{lacking[0]}' is missing or empty: torque is not used in this trial"]
-
-
-def _stack(table: Table, joints: tuple[str, ...], signal: str, path: Path) -> Array:
-    return np.stack([_finite(table, f"{joint}.{signal}", path) for joint in joints], axis=1)
-
-
-def _of_some(table: Table, joints: tuple[str, ...], signal: str, lacking: float, path: Path) -> Array | None:
-    """A signal (n, joints) that some joints have, or None where none has it."""
-    names = [f"{joint}.{signal}" for joint in joints]
-    if not any(name in table for name in names):
-        return None
-    rest = np.full(len(table["time"]), lacking)
-    return np.stack([_finite(table, name, path) if name in table else rest for name in names], axis=1)
+    torques = [f"{joint}.torque" for joint in joints]
+    lacking = [name for name in torques if name not in table or np.isnan(table[name]).all()]
+    if 0 < len(lacking) < len(joints):
+        warnings.append(f"{path}: column '{lacking[0]}' is missing or empty: torque is not used in this trial")
+    signals: dict[str, Array] = {}
+    for signal in SIGNALS:
+        names = [f"{joint}.{signal}" for joint in joints]
+        known = [name for name in names if name in table and name not in lacking]
+        if len(known) == len(names) or (known and signal in OF_SOME):
+            rest = np.full(samples, OF_SOME.get(signal, 0.0))
+            signals[signal] = np.stack([_finite(table, n, path) if n in known else rest for n in names], axis=1)
+    return TrialColumns(_finite(table, "time", path), **signals), warnings
 
 
 def _finite(table: Table, name: str, path: Path) -> Array:

@@ -90,7 +90,7 @@ def _check_gain(joint: str, columns: TrialColumns, index: int, gains: Gains, pat
         row = int(np.argmax(np.abs(columns.command[:, index] - position)))
         raise InputError(
             f"{path}: column '{joint}.position', row {row}: {position[row]:.4g}, and the torque is pi/180 of "
-            f"kp (command - position): {IN_DEGREES}"
+            f"kp (command - position): either controller.kp is 57.3 times too large, or {IN_DEGREES}"
         )
     if not 0.2 < slope < 5:
         return [

@@ -27,25 +27,15 @@ UNIT = 12  # letters of a unit at most
 
 @dataclass(frozen=True)
 class Dialect:
-    """How a CSV file is written.
+    """How a CSV file is written."""
 
-    Attributes:
-        separator: of fields.
-        decimal_comma: whether numbers have one.
-        names: of the columns.
-        units: column -> unit, of a row of units below the header.
-        header: lines down to and with the header and its units.
-        preamble: lines of text above the header.
-        encoding: of the text.
-    """
-
-    separator: str
-    decimal_comma: bool
-    names: list[str]
-    units: dict[str, str]
-    header: int
-    preamble: int
-    encoding: str
+    separator: str  # of fields
+    decimal_comma: bool  # whether numbers have one
+    names: list[str]  # of the columns
+    units: dict[str, str]  # column -> unit, of a row of units below the header
+    header: int  # lines down to and with the header and its units
+    preamble: int  # lines of text above the header
+    encoding: str  # of the text
 
 
 def dialect_of(path: Path) -> Dialect:
@@ -88,7 +78,10 @@ def _encoding(start: bytes) -> str:
 
 
 def _fields(line: str, separator: str) -> list[str]:
-    fields = next(csv.reader(line.splitlines()[:1], delimiter=separator), [])
+    try:
+        fields = next(csv.reader(line.splitlines()[:1], delimiter=separator), [])
+    except csv.Error:  # 130 kB without this separator: another one may stand in the line
+        return []
     return [field.strip().strip("\ufeff") for field in fields]
 
 

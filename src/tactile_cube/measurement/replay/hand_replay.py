@@ -1,7 +1,5 @@
 """Trials in which the whole hand holds an object, simulated in the world that training uses."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -86,7 +84,7 @@ class HandReplay:
         self._nominal = self._constants()
 
     def close(self) -> None:
-        """Ends the physics server."""
+        """End the physics server."""
         self._world.close()
 
     def simulate(self, trial: Trial, contact: ContactModel, offset: Array, until: float = np.inf) -> Simulated:

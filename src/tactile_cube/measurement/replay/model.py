@@ -1,13 +1,20 @@
-"""A model of a rig: constants of the drive, effects, and the joint offsets of each robot initialisation."""
+"""Model of a rig: constants, effects, joint offsets; the nominal one, that of a file, draws from its intervals."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from tactile_cube.drivetrain.effects import resolve
 from tactile_cube.drivetrain.effects.catalogue import catalogue
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Stage
+from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile
+from tactile_cube.errors import InputError
+from tactile_cube.measurement.joint_scales import joint_scales
+from tactile_cube.measurement.recordings.consistency import DEFAULTS, EFFECTS
+from tactile_cube.measurement.recordings.recording import Recording
 
 EffectClass = type[Effect]
 
@@ -79,3 +86,111 @@ class Model:
     def with_offsets(self, known: Mapping[int, Array]) -> Model:
         """The model with these joint offsets [rad] in initialisations of which it has none."""
         return replace(self, offsets={**known, **self.offsets})
+
+
+STATED = 0.5  # part by which a stated effect may be wrong: damping is copied from one model to the next
+CONTROLLER = ("kp", "kd", "torque_limit")
+TORQUE_MODE_GAIN = 1e-6  # [N m/rad] a commanded torque u is the position u / gain at this gain
+
+
+def nominal_model(recording: Recording, known: ModelFile | None = None) -> Model:
+    """What the recording's owner states, or what is known since; of effects, numbers with an interval are free.
+
+    They are expected where they were found, and twice as far from there as the interval says: a machine changes between
+    two recordings. Else what was found on one would soak up what is new in another.
+    """
+    constants = {key: np.array([one.value for one in row]) for key, row in _estimates(recording, known).items()}
+    terms = []
+    for one in _effects(recording, known):
+        given = {name: estimate.value for name, estimate in one.parameters.items()}
+        free = tuple(name for name, estimate in one.parameters.items() if estimate.high > estimate.low)
+        expected = {name: (e.value, 0.5 * (e.high - e.low)) for name, e in one.parameters.items() if name in free}
+        try:
+            placed = [(kind, joint, kind(joint, **given)) for kind, joint in resolve([one.effect], recording.joints)]
+        except InputError as error:
+            raise InputError(f"model: {error}") from None
+        terms += [Term(kind, joint, effect.values, free, expected) for kind, joint, effect in placed]
+    return Model(constants, tuple(terms), no_offsets(recording))
+
+
+def no_offsets(recording: Recording) -> dict[int, Array]:
+    """No joint offset in any initialisation."""
+    return {trial.initialisation: np.zeros(len(recording.joints)) for trial in recording.trials}
+
+
+def draw_model(
+    recording: Recording, known: ModelFile | None, spread: Mapping[str, float], rng: np.random.Generator
+) -> Model:
+    """One randomised model about the owner's values; what has an interval in `known` is drawn from that.
+
+    `spread` is the relative half width of a constant without an interval; its `offset` that of joint offsets [rad].
+    """
+    constants = {
+        key: np.array([_drawn(one, spread.get(key, 0.0), rng) for one in row])
+        for key, row in _estimates(recording, known).items()
+    }
+    effects = [
+        (one.effect, {key: _drawn(value, 0.0, rng) for key, value in one.parameters.items()})
+        for one in _effects(recording, known)
+    ]
+    width, offsets = spread.get("offset", 0.0), known.offsets if known is not None else {}
+    bounds = [(offsets[j].low, offsets[j].high) if j in offsets else (-width, width) for j in recording.joints]
+    offset = -np.array([rng.uniform(low, high) for low, high in bounds])
+    return Model(constants, terms_of(effects, recording.joints), dict.fromkeys(no_offsets(recording), offset))
+
+
+def _effects(recording: Recording, known: ModelFile | None) -> list[EffectEstimate]:
+    if known is not None:
+        return known.drive_effects
+    return _unknown_masses(recording) + [
+        EffectEstimate(
+            effect=f"{effect}@{joint}",
+            parameters={parameter: Estimate(value=v, low=(1.0 - STATED) * v, high=(1.0 + STATED) * v)},
+        )
+        for effect, parameter in EFFECTS.items()
+        for joint, v in zip(recording.joints, recording.nominal.get(effect, np.zeros(0)), strict=False)
+        if v > 0.0
+    ]
+
+
+def _unknown_masses(recording: Recording) -> list[EffectEstimate]:
+    """Masses of links that are guesses: more or less where they are now, by as much as they are or less."""
+    if "mass" not in recording.description.unknown:
+        return []
+    found = []
+    for joint, one in zip(recording.joints, joint_scales(recording), strict=True):
+        mass = Estimate(value=0.0, low=-one.mass, high=one.mass)
+        parameters = {"mass": mass, "distance": Estimate.model_validate(one.lever)}
+        found.append(EffectEstimate(effect=f"payload@{joint}", parameters=parameters))
+    return found
+
+
+def _drawn(estimate: Estimate, spread: float, rng: np.random.Generator) -> float:
+    """Uniform in the interval, or within the relative spread where there is none."""
+    if not np.isfinite(estimate.value):
+        return estimate.value
+    if estimate.high > estimate.low:
+        return float(rng.uniform(estimate.low, estimate.high))
+    return estimate.value * float(rng.uniform(1 - spread, 1 + spread))
+
+
+def _estimates(recording: Recording, known: ModelFile | None) -> dict[str, list[Estimate]]:
+    believed = {key: getattr(recording.gains, key) for key in CONTROLLER}
+    if recording.torque_controlled:
+        back_emf = recording.gains.kd * (recording.description.controller.mode == "voltage")
+        believed |= {"kp": np.full(len(recording.joints), TORQUE_MODE_GAIN), "kd": back_emf}
+    for key, value in DEFAULTS.items():
+        believed[key] = recording.nominal.get(key, np.full(len(recording.joints), value))
+    rows = {key: [Estimate(value=float(v), low=float(v), high=float(v)) for v in row] for key, row in believed.items()}
+    for key, by_joint in (known.values if known is not None else {}).items():
+        if key not in rows:
+            raise InputError(f"model: key 'values.{key}': not a constant of the drivetrain; known: {sorted(rows)}")
+        for index, joint in enumerate(recording.joints):
+            rows[key][index] = by_joint.get(joint, rows[key][index])
+    return rows
+
+
+def require_same_joints(recording: Recording, model: ModelFile) -> None:
+    """Refuse, by an InputError, a model whose joints are not the recording's."""
+    if set(model.joints) != set(recording.joints):
+        raise InputError(f"model: joints {model.joints} are not those of the recording, {list(recording.joints)}")

@@ -1,7 +1,5 @@
 """What a log shows of a simulation at an instant, and how much of a jump of the command its sensors show at once."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,6 +8,7 @@ from tactile_cube.drivetrain.effects.transmission import Backlash
 from tactile_cube.drivetrain.signals import COMMAND, LEAD, LOOP_GAIN, MOTOR_POSITION, TORQUE
 from tactile_cube.measurement.replay.windows import SAFE, Windows
 
+Array = NDArray[np.float64]
 SEEN = MOTOR_POSITION, TORQUE, COMMAND, LEAD, LOOP_GAIN
 PROBE = 0.05  # [rad] beyond every dead zone
 NOTHING = 1e-9  # part of the probe below which it is rounding that passes
@@ -55,13 +54,12 @@ def free_way(plant: Plant, memory: Array, jump: Array, lead: Array, gain: Array)
 
     Memory is (..., size), `jump` (..., n); `lead` and `gain` are the signals LEAD and LOOP_GAIN after the jump.
     """
-    if Backlash not in plant.effects:
+    if not gaps(plant, memory).any():
         return np.zeros_like(jump)
     p = plant.view(memory, "parameters:backlash")
     return Backlash.free_lead(lead, p, gain) - Backlash.free_lead(lead - jump, p, gain)
 
 
-Array = NDArray[np.float64]
 FEWEST = 3  # steps of a row of which two feel nothing of the row before
 
 

@@ -300,7 +300,7 @@ def sensors(recording: Recording) -> tuple[Array, Array]:
 
 
 def _zero_links(shown: Array, windows: Windows, joints: int) -> None:
-    """Shift what sensors on links show (S, K segment, M), for their zero is nobody's.
+    """Shift what sensors on links show (S, K segment, M): their zero is unknown.
 
     In each trial the mean of what a link is ahead of its motor becomes the measured one.
     """

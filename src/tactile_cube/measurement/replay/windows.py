@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tactile_cube.measurement.recordings.description import KnownForce
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Array, Trial
-from tactile_cube.measurement.replay.nominal import TORQUE_MODE_GAIN
+from tactile_cube.measurement.replay.model import TORQUE_MODE_GAIN
 
 Rows = NDArray[np.int64]
 SEGMENT = 0.4  # [s] identification works best with 0.2-0.5 s: a wrong start is no longer told from a wrong model beyond

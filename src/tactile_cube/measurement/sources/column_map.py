@@ -66,6 +66,8 @@ def map_columns(
         InputError: something is missing or can be read in two ways.
     """
     said = {joint: dict(entry) for joint, entry in given.items() if isinstance(entry, Mapping)}
+    if other := given.keys() - said.keys() - {"time"}:
+        raise InputError(f"source.columns.{min(other)}={given[min(other)]}: no mapping; expected {EXAMPLE}")
     chosen = said or _guessed(names, joints, mode, flags)
     _require_whole(chosen, names, mode)
     time = given.get("time", time_of(names))

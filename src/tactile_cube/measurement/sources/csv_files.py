@@ -13,10 +13,17 @@ from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.model_file import Strict
 from tactile_cube.errors import InputError
-from tactile_cube.measurement.comparing.repeats import lag_between
-from tactile_cube.measurement.recordings.columns import SIGNALS, TrialColumns
+from tactile_cube.measurement.comparing.noise_floor import lag_between
+from tactile_cube.measurement.recordings.columns import OF_SOME, SIGNALS, TrialColumns
 from tactile_cube.measurement.recordings.consistency import gains_of
-from tactile_cube.measurement.recordings.description import Description, PerJoint, Positive, Rate, TrialEntry
+from tactile_cube.measurement.recordings.description import (
+    Description,
+    NotNegative,
+    PerJoint,
+    Positive,
+    Rate,
+    TrialEntry,
+)
 from tactile_cube.measurement.recordings.plausibility import torque_over_law
 from tactile_cube.measurement.recordings.rig import Rig, RigJoint
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable, cut_trial
@@ -43,8 +50,6 @@ Array = NDArray[np.float64]
 Value = TypeVar("Value")
 Units = dict[str, dict[str, Unit]]
 """Joint -> signal -> unit."""
-OF_SOME = {"link_position": np.nan, "feedforward": 0.0}
-"""Signals that some joints may have, and what stands for those of the others."""
 SHOWN = 3  # steps of one kind
 REMEMBERED = 0.4  # [s] by which a drive has forgotten earlier commands, but for a rate limit
 MOVING, LOOK = 0.2, 0.03  # of a trial's usual speed, and [s] that it is read from
@@ -94,7 +99,7 @@ class CsvFiles(Mechanism):
     calibration: str | None
     gear: float | None
     read: Literal["before", "after"]
-    resolution: float
+    resolution: NotNegative
     length: Positive | None
     initialisation: Sequence[int] | None
     kind: Sequence[str] | None
@@ -102,6 +107,8 @@ class CsvFiles(Mechanism):
     def recordings(self, seed: int) -> dict[str, RecordingTables]:
         """One recording of all files."""
         mode, rig = self.controller.mode, self.rig()
+        if mode != "voltage" and (self.controller.kt or self.controller.R):
+            raise InputError(f"source.controller.mode={mode}: kt and R are of mode=voltage; say that or leave them out")
         left: list[str] = []
         logs = self._logs([name for name, joint in rig.joints.items() if joint.mimics is None])
         columns = self._columns(logs[0], rig)
@@ -226,7 +233,7 @@ class CsvFiles(Mechanism):
         said = with_stated({**stated, "mode": "torque" if mode == "free" else mode}, rig.gains, joints)
         nominal = with_stated(self.nominal, rig.nominal, joints)
         known = {*stated, *(key for key, value in self.nominal.items() if value is not None)}
-        unknown = [key for key in rig.unknown if key not in known and (key != "kd" or mode == "position")]
+        unknown = [key for key in rig.unknown if key not in known and (key not in ("kp", "kd") or mode == "position")]
         if mode == "position":
             lacking = [key for key in ("kp", "kd") if key not in said]
             lacking += [key for key in ("reflected_inertia",) if lacking and key not in nominal]

@@ -42,77 +42,19 @@ URDF = """<?xml version="1.0"?>
 AXES = {"pendulum": "0 1 0", "wheel": "0 0 1", "slide": "1 0 0"}
 
 
-@dataclass(frozen=True)
-class Lever:
-    """What is known of such a joint."""
+def lever_rig(robot: str, mass: float = 1.0, lever: float = LEVER, hangs_at: float = 0.0) -> Rig:
+    """Return one of ROBOTS (else an InputError): a mass [kg], of a wheel its rim's, at a lever [m] from the axis.
 
-    robot: str  # one of ROBOTS, also the joint's name
-    mass: float | None = None  # at the end of the lever, of a wheel that of its rim [kg]
-    lever: float | None = None  # from the axis to the mass [m]
-
-    def __post_init__(self) -> None:
-        """Refuse another robot."""
-        if self.robot not in ROBOTS:
-            raise InputError(
-                f"source.robot={self.robot}: unknown; choose one of {', '.join(ROBOTS)}, or give source.urdf"
-            )
-
-    def rig(self, mass: float = 1.0, lever: float = LEVER, hangs_at: float = 0.0) -> Rig:
-        """Return it as a mechanism; of a pendulum that hangs down at an angle [rad]."""
-        size = lever**2 if self.robot == "wheel" else 1e-3 * lever**2
-        text = URDF.format(
-            robot=self.robot, kind="prismatic" if self.robot == "slide" else "continuous", axis=AXES[self.robot],
-            mass=mass, com=-lever if self.robot == "pendulum" else 0.0, own=mass * size, turned=-hangs_at or 0.0,
-        )  # fmt: skip
-        return parse_rig(text, Path(f"{self.robot}.urdf"))
-
-    def sized(self, trials: Sequence[TrialTable], mode: str, kp: float | None, gravity: float) -> Rig:
-        """Return it with the masses that logs of this joint show under gravity [m/s^2], and what stays unknown."""
-        found = _seen(trials, mode, self.robot == "pendulum", kp or UNIT_GAIN)
-        if self.mass is not None:
-            rig = self.rig(self.mass, self.lever or LEVER, found.hangs_at)
-            return replace(rig, doubts=self._doubts(found, ""))
-        inertia = max(found.inertia, 1e-9 * (kp or UNIT_GAIN))
-        mass, lever = self._link(found, inertia, gravity)
-        scale = 1.0 / mass if mode == "free" else 1.0
-        of_link = mass if self.robot == "slide" else mass * lever**2
-        guessed = {"reflected_inertia": max(inertia - of_link, 0.1 * of_link) * scale}
-        unknown = ["reflected_inertia"]
-        if mode != "free" and self.robot == "pendulum":
-            unknown.append("mass")
-        if mode == "position":
-            guessed |= {"kd": max(found.damping, 0.01 * (kp or UNIT_GAIN))}
-            guessed |= {} if kp else {"kp": UNIT_GAIN}
-            unknown.append("kd")
-        open_ = "no torque is known" if mode == "free" else ""
-        if mode == "position" and not kp:
-            open_ = f"kp is not stated, {UNIT_GAIN:g} N m/rad is a guess"
-        stated = {key: {self.robot: float(f"{value:.4g}")} for key, value in guessed.items()}
-        rig = self.rig(mass * scale, lever, found.hangs_at)
-        doubts = self._doubts(found, open_)
-        return replace(rig, stated=stated, stated_by="the log", unknown=tuple(unknown), doubts=doubts)
-
-    def _link(self, found: _Seen, inertia: float, gravity: float) -> tuple[float, float]:
-        """Mass [kg] and lever [m] of the link: a part of the inertia, and the weight."""
-        own = OF_LINK[self.robot] * inertia
-        if self.robot == "slide":
-            return own, LEVER
-        if self.robot == "wheel" or found.weight <= 0.0:
-            lever = self.lever or LEVER
-            return own / lever**2, lever
-        lever = self.lever or min(LEVER, own * gravity / found.weight)
-        return found.weight / (gravity * lever), lever
-
-    def _doubts(self, found: _Seen, scale: str) -> tuple[str, ...]:
-        guessed = f"no URDF: mass, lever and rotor of the {self.robot} are guesses from the log, and are identified"
-        light = self.robot == "pendulum" and found.weight <= NO_WEIGHT * found.drive
-        lines = {
-            guessed: self.mass is None,
-            f"{scale}: of torques, gains and inertias only the ratios are known": scale,
-            "the log shows no weight: is it a wheel (source.robot=wheel)?": light,
-            f"by the log the pendulum hangs down at {found.hangs_at:.3g} rad, not at 0": found.hangs_at,
-        }
-        return tuple(line for line, holds in lines.items() if holds)
+    A pendulum hangs down at an angle [rad].
+    """
+    if robot not in ROBOTS:
+        raise InputError(f"source.robot={robot}: unknown; choose one of {', '.join(ROBOTS)}, or give source.urdf")
+    text = URDF.format(
+        robot=robot, kind="prismatic" if robot == "slide" else "continuous", axis=AXES[robot],
+        mass=mass, com=-lever if robot == "pendulum" else 0.0, turned=-hangs_at or 0.0,
+        own=mass * (lever**2 if robot == "wheel" else 1e-3 * lever**2),
+    )  # fmt: skip
+    return parse_rig(text, Path(f"{robot}.urdf"))
 
 
 @dataclass(frozen=True)
@@ -206,30 +148,65 @@ class Mechanism:
                 raise InputError(
                     f"source.{key}={getattr(self, key):g}: is that of source.{whose}=NAME, which is not given"
                 )
-        rig = Lever(str(self.robot), self.mass, self.lever).rig() if self.urdf is None else read_rig(Path(self.urdf))
+        rig = lever_rig(str(self.robot)) if self.urdf is None else read_rig(Path(self.urdf))
         if self.servo is None:
             return rig
         constants = read_servo(self.servo).constants(self.gain)
         stated = {**rig.stated, **{key: dict.fromkeys(rig.joints, value) for key, value in constants.items()}}
-        doubt = f"constants of the servo {self.servo} are those of another unit; its kd and rotor are identified"
-        return replace(
-            rig, stated=stated, stated_by=f"servo {self.servo}", unknown=("kd", "reflected_inertia"), doubts=(doubt,)
-        )
+        # beside a mass that is a guess, the gain is the scale of everything
+        unknown = ("kp", "kd", "reflected_inertia")[self.robot is not None and self.mass is None :]
+        doubt = f"constants of the servo {self.servo} are those of another unit; {', '.join(unknown)} are identified"
+        return replace(rig, stated=stated, stated_by=f"servo {self.servo}", unknown=unknown, doubts=(doubt,))
 
     def sized(self, rig: Rig, trials: Sequence[TrialTable], mode: str, kp: PerJoint | None, gravity: float) -> Rig:
-        """Return the rig with masses that logs show where nobody says them; see `Lever.sized`."""
+        """Return it with the masses that logs show under gravity [m/s^2] where nobody says them."""
         if self.robot is None:
             return rig
         said = with_stated({"kp": kp}, rig.gains, [self.robot]).get("kp")
         try:
-            gain = None if said is None else float(per_joint(said, (self.robot,), "source.controller.kp")[0])
+            known = None if said is None else float(per_joint(said, (self.robot,), "source.controller.kp")[0])
         except ValueError as error:
             raise InputError(str(error)) from None
-        sized = Lever(str(self.robot), self.mass, self.lever).sized(trials, mode, gain, gravity)
+        gain = known or UNIT_GAIN
+        found, open_ = _seen(trials, mode, self.robot == "pendulum", gain), ""
+        mass, lever, guessed, unknown = self.mass, self.lever or LEVER, dict[str, float](), list[str]()
+        if mass is None:
+            inertia = max(found.inertia, 1e-9 * gain)
+            mass, lever = self._link(found, inertia, gravity)
+            scale = 1.0 / mass if mode == "free" else 1.0
+            of_link = mass if self.robot == "slide" else mass * lever**2
+            guessed = {"reflected_inertia": max(inertia - of_link, 0.1 * of_link) * scale}
+            unknown = ["reflected_inertia", *["mass"] * (mode != "free" and self.robot == "pendulum")]
+            if mode == "position":
+                guessed |= {"kd": max(found.damping, 0.01 * gain)} | ({} if known else {"kp": UNIT_GAIN})
+                unknown.append("kd")
+            mass *= scale
+            open_ = "no torque is known" if mode == "free" else ""
+            if mode == "position" and not known:
+                open_ = f"kp is not stated, {UNIT_GAIN:g} N m/rad is a guess"
+        guess = f"no URDF: mass, lever and rotor of the {self.robot} are guesses from the log, and are identified"
+        light = self.robot == "pendulum" and found.weight <= NO_WEIGHT * found.drive
+        doubts = {
+            guess: self.mass is None,
+            f"{open_}: of torques, gains and inertias only the ratios are known": open_,
+            "the log shows no weight: is it a wheel (source.robot=wheel)?": light,
+            f"by the log the pendulum hangs down at {found.hangs_at:.3g} rad, not at 0": found.hangs_at,
+        }
         return replace(
-            sized,
-            stated={**sized.stated, **rig.stated},
-            stated_by=rig.stated_by or sized.stated_by,
-            unknown=tuple(dict.fromkeys([*sized.unknown, *rig.unknown])),
-            doubts=(*rig.doubts, *sized.doubts),
+            lever_rig(self.robot, mass, lever, found.hangs_at),
+            stated={key: {self.robot: float(f"{value:.4g}")} for key, value in guessed.items()} | dict(rig.stated),
+            stated_by=rig.stated_by or ("the log" if guessed else ""),
+            unknown=tuple(dict.fromkeys([*unknown, *rig.unknown])),
+            doubts=(*rig.doubts, *(line for line, holds in doubts.items() if holds)),
         )
+
+    def _link(self, found: _Seen, inertia: float, gravity: float) -> tuple[float, float]:
+        """Mass [kg] and lever [m] of the link: a part of the inertia, and the weight."""
+        own = OF_LINK[str(self.robot)] * inertia
+        if self.robot == "slide":
+            return own, LEVER
+        if self.robot == "wheel" or found.weight <= 0.0:
+            lever = self.lever or LEVER
+            return own / lever**2, lever
+        lever = self.lever or min(LEVER, own * gravity / found.weight)
+        return found.weight / (gravity * lever), lever

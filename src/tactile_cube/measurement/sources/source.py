@@ -108,23 +108,18 @@ def recording_tables(settings: Mapping[str, Any], option: str, seed: int) -> dic
     try:
         checked: Source = TypeAdapter(source).validate_python(given)
     except ValidationError as error:
-        missing = [str(one["loc"][0]) for one in error.errors() if one["type"] == "missing"]
+        missing = [str(one["loc"][0]) for one in error.errors() if one["type"] == "missing" and len(one["loc"]) == 1]
         if missing:
             text = (CONFIG / "source" / f"{option}.yaml").read_text(encoding="utf-8")
             said = dict(re.findall(r"^ *(\w+): \?\?\? *# *(.*)$", text, re.MULTILINE))
             needs = [f"source.{key}=..." + (f" ({said[key]})" if key in said else "") for key in missing]
             raise InputError(f"source={option} needs {'; '.join(needs)}") from None
-        raise InputError(_refused(error, given)) from None
+        first, keys = error.errors()[0], ["source"]
+        place: Any = given
+        for part in first["loc"]:  # behind the keys stand alternatives of a type
+            if not isinstance(place, Mapping) or part not in place:
+                break
+            place, keys = place[part], [*keys, str(part)]
+        expected = "more values" if first["type"] == "missing" else str(first["msg"]).removeprefix("Input should be ")
+        raise InputError(f"{'.'.join(keys)}={place}: expected {expected}") from None
     return checked.recordings(seed)
-
-
-def _refused(error: ValidationError, given: Mapping[str, Any]) -> str:
-    first = error.errors()[0]
-    place: Any = given
-    keys: list[str] = []
-    for part in first["loc"]:  # behind the keys stand alternatives of a type
-        if not isinstance(place, Mapping) or part not in place:
-            break
-        place, keys = place[part], [*keys, str(part)]
-    said = str(first["msg"]).removeprefix("Input should be ")
-    return f"source.{'.'.join(keys)}={place}: expected {said}"

@@ -84,18 +84,15 @@ def chosen_unit(said: str | int | None, name: str, units: Mapping[str, float], k
             others = f", {RANGE} (LeRobot's -100 .. 100) or the ticks of a turn" if key == "angle_unit" else ""
             raise InputError(f"source.{key}={said}: unknown; choose one of {', '.join(units)}{others}")
         return Unit(str(said), units[str(said)], f"source.{key}")
-    found = _named(name, units)
-    return None if found is None else Unit(found, units[found], "its name")
-
-
-def _named(name: str, allowed: Mapping[str, float]) -> str | None:
     torque = TORQUE_UNIT.search(name)
-    if torque is not None and set(allowed) & set(TORQUE_PREFIX.values()):
-        return TORQUE_PREFIX[(torque.group(1) or torque.group(2) or "").lower()]
-    if "°" in name and "deg" in allowed:
-        return "deg"
-    said = reversed(words(name)[1:] or words(name))
-    return next((unit for word in said for unit in allowed if word in UNITS.get(unit, ())), None)
+    if torque is not None and units.keys() & set(TORQUE_PREFIX.values()):
+        found = TORQUE_PREFIX[(torque.group(1) or torque.group(2) or "").lower()]
+    elif "°" in name and "deg" in units:
+        found = "deg"
+    else:
+        spelt = reversed(words(name)[1:] or words(name))
+        found = next((unit for word in spelt for unit in units if word in UNITS.get(unit, ())), "")
+    return Unit(found, units[found], "its name") if found else None
 
 
 def time_unit(said: str | None, name: str, time: Array) -> Unit:
@@ -136,29 +133,25 @@ def position_unit(
             )
         ticks = _ticks(USUAL_TICKS, values, joint, f"its name; {USUAL_TICKS} a turn is assumed")
         return replace(ticks, doubt=f"{USUAL_TICKS} ticks a turn are assumed; source.angle_unit=TICKS if not")
-    units = LENGTH_UNITS if joint.prismatic else ANGLE_UNITS
-    chosen = chosen_unit(said, name, units, "length_unit" if joint.prismatic else "angle_unit")
-    if chosen is not None:
+    key, units = ("length_unit", LENGTH_UNITS) if joint.prismatic else ("angle_unit", ANGLE_UNITS)
+    if (chosen := chosen_unit(said, name, units, key)) is not None:
         return chosen
-    unit = _fitting(values, joint)
-    if lerobot and np.abs(values).max() <= 100.0:
-        doubt = "LeRobot writes degrees or -100 .. 100 of the calibrated range: source.angle_unit=deg or range"
-        return replace(unit, doubt=f"taken for {unit.name}; {doubt}")
-    return unit
-
-
-def _fitting(values: Array, joint: RigJoint) -> Unit:
-    key, names = ("length_unit", LENGTH_UNITS) if joint.prismatic else ("angle_unit", ANGLE_UNITS)
-    limited = bool(np.isfinite(joint.upper - joint.lower))
-    by = "the joint's limits" if limited else "no limits of the joint that would tell"
     range_ = f"values {values.min():.3g} .. {values.max():.3g}"
-    for unit in ("m", "mm") if joint.prismatic else ("rad", "deg"):
-        if joint.reaches(values * names[unit]):
-            doubt = f"taken for {unit}, which no limits of the joint prove; source.{key}={unit} if so"
-            return Unit(unit, names[unit], f"{range_} and {by}", doubt="" if limited else doubt)
-    first = next(iter(names))
-    doubt = f"taken for {first}, which does not fit the joint's limits ({range_}); source.{key}=UNIT"
-    return Unit(first, 1.0, "assumed: no unit fits the joint's limits", doubt=doubt)
+    unit = next(
+        (u for u in (("m", "mm") if joint.prismatic else ("rad", "deg")) if joint.reaches(values * units[u])), ""
+    )
+    if not unit:
+        unit, by = next(iter(units)), "assumed: no unit fits the joint's limits"
+        doubt = f"taken for {unit}, which does not fit the joint's limits ({range_}); source.{key}=UNIT"
+    elif np.isfinite(joint.upper - joint.lower):
+        by, doubt = f"{range_} and the joint's limits", ""
+    else:
+        by = f"{range_} and no limits of the joint that would tell"
+        doubt = f"taken for {unit}, which no limits of the joint prove; source.{key}={unit} if so"
+    if lerobot and np.abs(values).max() <= 100.0:
+        ways = "LeRobot writes degrees or -100 .. 100 of the calibrated range: source.angle_unit=deg or range"
+        doubt = f"taken for {unit}; {ways}"
+    return Unit(unit, units[unit], by, doubt=doubt)
 
 
 def _grips(name: str, joint: RigJoint) -> bool:
@@ -192,6 +185,8 @@ def calibrated_spans(path: Path) -> dict[str, float]:
     try:
         motors = json.loads(read_text(path))
         ticks = {name: float(one["range_max"]) - float(one["range_min"]) for name, one in motors.items()}
+    except InputError:
+        raise
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(
             f"{path}: not LeRobot's calibration, {{MOTOR: {{range_min: TICKS, range_max: TICKS}}}}: {error!r}"

@@ -1,0 +1,8 @@
+"""`python -m tactile_cube.average`: see `tactile_cube.commands.average`."""
+
+from tactile_cube.cli import command_line
+
+main = command_line("average")
+
+if __name__ == "__main__":
+    main()

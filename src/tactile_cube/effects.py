@@ -1,0 +1,8 @@
+"""`python -m tactile_cube.effects`: see `tactile_cube.commands.effects`."""
+
+from tactile_cube.cli import command_line
+
+main = command_line("effects")
+
+if __name__ == "__main__":
+    main()

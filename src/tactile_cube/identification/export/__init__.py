@@ -1,1 +1,0 @@
-"""A model in the words of other programs: MJCF, URDF, BAM."""

@@ -1,0 +1,8 @@
+"""`python -m tactile_cube.identify`: see `tactile_cube.commands.identify`."""
+
+from tactile_cube.cli import command_line
+
+main = command_line("identify")
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,8 @@
+"""`python -m tactile_cube.train`: see `tactile_cube.commands.train`."""
+
+from tactile_cube.cli import command_line
+
+main = command_line("train")
+
+if __name__ == "__main__":
+    main()
