@@ -54,7 +54,7 @@ class Page:
             "stages": ("Error by stage", [self.stairs, row_of(undo)]),
             "values": ("Numbers of the model", self._values_part()),
             "next": ("Next experiment", [row_of(propose), self.proposal, self.experiment.figure]),
-            "save": ("Save", [row_of(folder, button("Save", lambda: desk.save(folder.value)))]),
+            "save": ("Save", [row_of(folder, button("Save", lambda: self.desk.save(folder.value)))]),
         }
         self.steps = [
             column_of(text_of(TITLE.format(title), styles=LINE), *parts, name=name, visible=False)
