@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 LOOKED_AT = 4  # part of the segments to judge by, on which every law gets its own steps
 PROMISING = 0.01  # of its joint's squared error: what a law promises less than at first has never come to a fifth of it
 STEPS = 2  # of Gauss-Newton that every other law gets
-MORE_STEPS = 6  # that a law gets which does worse than none as yet, or may be a twin of the chosen one
+MORE_STEPS = 6  # that a law gets which may be a twin of the chosen one
 LARGER = 2.0  # times that a law may be in a set what its own steps made it; an integral that saturates promised ten
 SINGLES, SETS = 4, 3  # laws, and sets of several, that are refitted exactly
 CLOSE = 2.5  # squared error over the best one's up to which another law may do as well when everything is free
@@ -98,10 +98,7 @@ def wanted(search: Search, problem: Problem, frozen: Fit) -> list[Candidate]:
 def stepped(problem: Problem, frozen: Fit, candidate: Candidate) -> tuple[Candidate, Fit]:
     """A law after its own steps beside a fit, whose columns stay."""
     model, unknowns = candidate.added_to(frozen.model)
-    fitted = fit(problem, model, unknowns, STEPS, frozen)
-    if fitted.cost > frozen.cost:  # worse than without it: constants that had soaked it up are still on their way
-        fitted = fit(problem, fitted.model, unknowns, MORE_STEPS, frozen)
-    return candidate, fitted
+    return candidate, fit(problem, model, unknowns, STEPS, frozen)
 
 
 def best_starts(scores: Sequence[Score]) -> list[Candidate]:
