@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects.effect import Stage
-from tactile_cube.identification.fitting.gauss_newton import Fit, fit, noise_inflation, precision
+from tactile_cube.identification.fitting.gauss_newton import Fit, fit, noise_inflation, precision, renewed
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.search.candidates import (
     Candidate,
@@ -29,7 +29,6 @@ from tactile_cube.identification.search.search import Search, some
 Array = NDArray[np.float64]
 LOOKED_AT = 4  # part of the segments to judge by, on which every law gets its own steps
 PROMISING = 0.01  # of its joint's squared error: what a law promises less than at first has never come to a fifth of it
-SETTLED = 4  # most steps by which the set itself comes to rest on the windows of a look
 STEPS = 2  # of Gauss-Newton that every other law gets
 MORE_STEPS = 6  # that a law gets which may be a twin of the chosen one
 LARGER = 2.0  # times that a law may be in a set what its own steps made it; an integral that saturates promised ten
@@ -77,7 +76,7 @@ def look(search: Search, parent: Proposal, at: Sequence[str]) -> Looks:
     """Every law at these joints that promises something gets its own steps beside a set that is fitted."""
     problem = Problem(search.shooting, some(search.all_windows, search.segments // LOOKED_AT))
     problem.linearise_starts(parent.fit.model)
-    frozen = fit(problem, parent.fit.model, parent.fit.unknowns, SETTLED)  # else any law would gain what is left to it
+    frozen = renewed(problem, parent.fit, *problem.columns(parent.fit.model, parent.fit.unknowns))
     there = named_by(parent.effects)
     possible = [
         one
@@ -190,8 +189,9 @@ def sets(looks: Looks) -> list[tuple[tuple[Candidate, Fit], ...]]:
     problem, laws = looks.problem, looks.tried
     if len(laws) < 2:
         return []
-    gradient, gram = products(problem, looks.frozen, [fitted for _, fitted in laws])
-    expected = noise_inflation(problem, looks.frozen.cost)
+    alike = fit(problem, looks.frozen.model, (), STEPS, looks.frozen)  # what the same steps change without any law
+    gradient, gram = products(problem, alike, [fitted for _, fitted in laws])
+    expected = noise_inflation(problem, alike.cost)
     alone = np.array([press(gradient[:, [k]], gram[:, [k]][:, :, [k]], expected) for k in range(len(laws))])
     found = []
     for rows in wanted_sets([candidate for candidate, _ in laws]):
