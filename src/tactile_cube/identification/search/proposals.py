@@ -31,7 +31,7 @@ LOOKED_AT = 4  # part of the segments to judge by, on which every law gets its o
 PROMISING = 0.01  # of its joint's squared error: what a law promises less than at first has never come to a fifth of it
 STEPS = 2  # of Gauss-Newton that every other law gets
 MORE_STEPS = 6  # that a law gets which may be a twin of the chosen one
-LARGER = 2.0  # times that a law may be in a set what its own steps made it; an integral that saturates promised ten
+LARGER = 2.0  # times that a law may be in a set what its own steps made it: what it changes is known near that
 SINGLES, SETS = 4, 3  # laws, and sets of several, that are refitted exactly
 CLOSE = 2.5  # squared error over the best one's up to which another law may do as well when everything is free
 
