@@ -3,11 +3,13 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.identification.criteria import Criteria
 from tactile_cube.identification.search.explanation import named_by
 from tactile_cube.identification.search.findings import find
+from tactile_cube.identification.search.proposals import press
 from tactile_cube.identification.search.search import BestSoFar, Search
 from tactile_cube.identification.verdict import decide
 from tactile_cube.measurement.split import held_out_split
@@ -53,3 +55,10 @@ def test_a_search_that_may_simulate_little_ends_early_and_says_what_it_has_and_w
     assert lines[-1].startswith("best answer so far: constants refitted (")
     assert lines[-1].endswith("; next: every law by itself")
     assert not find(Search(*held_out_split(recording), np.full(1, NOISE), effects, lambda line: None)).stopped
+
+
+def test_a_law_is_never_made_much_larger_than_its_own_steps_made_it() -> None:
+    gram = np.full((2, 1, 1), 1.0)
+    assert press(np.full((2, 1), 1.0), gram, 0.0) == pytest.approx(2.0), "as it is it takes away all that it changes"
+    assert press(np.full((2, 1), 10.0), gram, 0.0) == pytest.approx(2 * (2 * 2.0 * 10.0 - 4.0)), "twice, not ten times"
+    assert press(np.full((2, 1), -1.0), gram, 0.0) == 0.0, "and not turned round"

@@ -194,15 +194,17 @@ class Problem:
 
     def columns(self, model: Model, unknowns: Sequence[Unknown]) -> tuple[Array, Array]:
         """Prediction (G, R) of a model and its derivatives (G, R, P), weighted, per unit of each unknown's scale."""
-        moved = [moved_model(model, unknown) for unknown in _simulated(unknowns)]
         base = self.prediction(model)
+        if not unknowns:
+            return base, np.zeros((*base.shape, 0))
+        moved = [moved_model(model, unknown) for unknown in _simulated(unknowns)]
         predictions = self.predictions([one for one, _ in moved], model)
         found = {
             _key(unknown): (np.clip(p - base, -self.run_away, self.run_away) / step * self.weight)
             for unknown, p, (_, step) in zip(_simulated(unknowns), predictions, moved, strict=True)
         }
         columns = [self._masked(found[_key(unknown)], unknown) for unknown in unknowns]
-        return base, np.nan_to_num(np.stack(columns, axis=-1)) if columns else np.zeros((*base.shape, 0))
+        return base, np.nan_to_num(np.stack(columns, axis=-1))
 
     def _masked(self, column: Array, unknown: Unknown) -> Array:
         if unknown.kind != "offset":

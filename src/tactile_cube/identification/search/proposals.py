@@ -31,6 +31,7 @@ LOOKED_AT = 4  # part of the segments to judge by, on which every law gets its o
 PROMISING = 0.01  # of its joint's squared error: what a law promises less than at first has never come to a fifth of it
 STEPS = 2  # of Gauss-Newton that every other law gets
 MORE_STEPS = 6  # that a law gets which may be a twin of the chosen one
+LARGER = 2.0  # times that a law may be in a set what its own steps made it: what it changes is known near that
 SINGLES, SETS = 4, 3  # laws, and sets of several, that are refitted exactly
 CLOSE = 2.5  # squared error over the best one's up to which another law may do as well when everything is free
 
@@ -188,8 +189,9 @@ def sets(looks: Looks) -> list[tuple[tuple[Candidate, Fit], ...]]:
     problem, laws = looks.problem, looks.tried
     if len(laws) < 2:
         return []
-    gradient, gram = products(problem, looks.frozen, [fitted for _, fitted in laws])
-    expected = noise_inflation(problem, looks.frozen.cost)
+    alike = fit(problem, looks.frozen.model, (), STEPS, looks.frozen)  # what the same steps change without any law
+    gradient, gram = products(problem, alike, [fitted for _, fitted in laws])
+    expected = noise_inflation(problem, alike.cost)
     alone = np.array([press(gradient[:, [k]], gram[:, [k]][:, :, [k]], expected) for k in range(len(laws))])
     found = []
     for rows in wanted_sets([candidate for candidate, _ in laws]):
@@ -230,11 +232,13 @@ def products(problem: Problem, frozen: Fit, fits: Sequence[Fit]) -> tuple[Array,
 
 
 def press(gradient: Array, gram: Array, expected: float) -> float:
-    """What trials gain by columns that the others have sized: gradients (T, C), products (T, C, C)."""
+    """What trials gain by columns that the others have sized: gradients (T, C), products (T, C, C).
+
+    Each law was sized by its own steps, so no factor turns it round or makes it more than `LARGER` times as large.
+    """
     total, whole = gradient.sum(axis=0), gram.sum(axis=0) + expected * np.eye(gram.shape[1])
-    if len(gradient) < 2:
-        return float(total @ np.linalg.solve(whole, total))
-    factors = np.linalg.solve(whole - gram, (total - gradient)[..., None])[..., 0]
+    others = (whole - gram, total - gradient) if len(gradient) > 1 else (whole[None], total[None])
+    factors = np.clip(np.linalg.solve(others[0], others[1][..., None])[..., 0], 0.0, LARGER)
     return float(np.sum(2.0 * factors * gradient) - np.einsum("tc,tcd,td->", factors, gram, factors))
 
 
