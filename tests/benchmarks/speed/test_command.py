@@ -13,7 +13,7 @@ def speed(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=280)
 
 
-def test_a_section_ends_in_a_table_a_page_numbers_and_a_picture(tmp_path: Path) -> None:
+def test_a_section_ends_in_a_table_a_page_and_numbers(tmp_path: Path) -> None:
     run = speed("update", "--rounds", "1", "--no-peers", "--out", str(tmp_path))
     assert run.returncode == 0, run.stderr
     assert "| tactile_cube plain_sac, bf16 " in run.stdout
@@ -21,7 +21,6 @@ def test_a_section_ends_in_a_table_a_page_numbers_and_a_picture(tmp_path: Path) 
     found = json.loads((tmp_path / "benchmark.json").read_text())
     assert found["machine"]["torch"]
     assert [section["name"] for section in found["sections"]] == ["update"]
-    assert (tmp_path / "benchmark.png").stat().st_size > 10_000
 
 
 def test_an_unknown_section_is_refused_with_the_choices() -> None:
