@@ -110,7 +110,13 @@ class StickyAction(Transform):  # type: ignore[misc]
     """
 
     def __init__(self, probability: float, in_keys_inv: Sequence[NestedKey] = ("action",)) -> None:
-        """Repeats the action of the given key with `probability` at each step, independently in each world."""
+        """Repeats the action of the one given key with `probability` at each step, independently in each world.
+
+        Raises:
+            ValueError: several keys.
+        """
+        if len(in_keys_inv) != 1:
+            raise ValueError(f"in_keys_inv={list(in_keys_inv)}: a sticky action is one; give one transform a key")
         super().__init__(in_keys_inv=in_keys_inv, out_keys_inv=in_keys_inv)
         self.probability = probability
         self._last: Tensor | None = None

@@ -44,6 +44,7 @@ class Looks:
         parent: the set.
         problem: few windows.
         frozen: its fit there.
+        alike: the same after as many steps as every law gets, so that what a law changes is its own.
         tried: laws that promise something, with their fits there, best first.
         scores: the first look at every law, best first.
     """
@@ -51,6 +52,7 @@ class Looks:
     parent: Proposal
     problem: Problem = field(repr=False)
     frozen: Fit = field(repr=False)
+    alike: Fit = field(repr=False)
     tried: list[tuple[Candidate, Fit]] = field(repr=False)
     scores: list[Score] = field(repr=False)
 
@@ -87,7 +89,8 @@ def look(search: Search, parent: Proposal, at: Sequence[str]) -> Looks:
     squares = dict(zip(search.fitted.joints, joint_squares(problem, frozen.residual), strict=True))
     promising = [one for one in scores if one.gain > PROMISING * min(squares[joint] for joint in one.candidate.joints)]
     tried = sorted((stepped(problem, frozen, one) for one in best_starts(promising)), key=lambda pair: pair[1].cost)
-    return Looks(parent, problem, frozen, tried, scores)
+    alike = fit(problem, frozen.model, (), STEPS, frozen)
+    return Looks(parent, problem, frozen, alike, tried, scores)
 
 
 def wanted(search: Search, problem: Problem, frozen: Fit) -> list[Candidate]:
@@ -148,7 +151,7 @@ def explains_most(search: Search, looks: Looks, fitted: Fit) -> bool:
     """Whether a law has explained most of what the set leaves above the noise by its own steps."""
     count = np.count_nonzero(looks.problem.weight)
     most = search.criteria.most
-    return bool(fitted.cost - count <= max((1.0 - most) * (looks.frozen.cost - count), (CLOSE - 1.0) * count))
+    return bool(fitted.cost - count <= max((1.0 - most) * (looks.alike.cost - count), (CLOSE - 1.0) * count))
 
 
 def further(looks: Looks, fitted: Fit) -> Fit:
@@ -189,9 +192,8 @@ def sets(looks: Looks) -> list[tuple[tuple[Candidate, Fit], ...]]:
     problem, laws = looks.problem, looks.tried
     if len(laws) < 2:
         return []
-    alike = fit(problem, looks.frozen.model, (), STEPS, looks.frozen)  # what the same steps change without any law
-    gradient, gram = products(problem, alike, [fitted for _, fitted in laws])
-    expected = noise_inflation(problem, alike.cost)
+    gradient, gram = products(problem, looks.alike, [fitted for _, fitted in laws])
+    expected = noise_inflation(problem, looks.alike.cost)
     alone = np.array([press(gradient[:, [k]], gram[:, [k]][:, :, [k]], expected) for k in range(len(laws))])
     found = []
     for rows in wanted_sets([candidate for candidate, _ in laws]):
