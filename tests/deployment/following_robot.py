@@ -52,6 +52,7 @@ class FollowingRobot:
         self.released_at = 0.0
         self.tried = Mode.STOPPED
         self.confirms = True
+        self.broken: list[str] = []
         self.loop: ControlLoop
 
     def clock(self) -> float:
@@ -120,7 +121,8 @@ def drive(
         assert robot.loop.mode is Mode.STOPPED
         if robot.sent:
             with np.errstate(over="ignore"):  # of a clock that says 1e308
-                _assert_safe(robot, limits, rules)
+                robot.broken = broken_rules(robot, limits, rules)
+            assert not robot.broken
             assert robot.tried is Mode.STOPPED
             assert presses or torque(robot.sent[-1], limits) <= rules.tolerance
 
@@ -130,23 +132,27 @@ def torque(sent: Sent, limits: JointLimits) -> float:
     return float(np.max(limits.kp * np.abs(sent.q_d - np.clip(sent.accepted.q_m, limits.lower, limits.upper))))
 
 
-def _assert_safe(robot: FollowingRobot, limits: JointLimits, rules: StopRules) -> None:
+def broken_rules(robot: FollowingRobot, limits: JointLimits, rules: StopRules) -> list[str]:
+    """What a safe command keeps and one of these did not."""
     q_d, accepted = (np.array(rows) for rows in zip(*((one.q_d, one.accepted.q_m) for one in robot.sent), strict=True))
     sent, ours, stamped = np.array([(one.time, one.elapsed, one.accepted.time) for one in robot.sent]).T
     stopped = np.array([one.mode is Mode.STOPPED for one in robot.sent])
     since = np.where(stopped[1:], np.diff(ours), np.diff(sent))[:, None]
     weak = limits.kp * np.abs(q_d - accepted)[1:] < limits.torque * (1 - SMALL)  # else the torque may ask for more
     since = np.where(weak & stopped[1:, None], np.minimum(since, rules.lateness), since)
-    assert np.isfinite(q_d).all()
-    assert ((limits.lower <= q_d) & (q_d <= limits.upper)).all()
-    assert (limits.kp * np.abs(q_d - accepted) <= limits.torque * (1 + SMALL) + SMALL).all()
-    assert (np.abs(np.diff(q_d, axis=0)) <= limits.rate * (1 + SMALL) * since + SMALL).all()
-    np.testing.assert_array_equal(q_d[0], np.clip(accepted[0], limits.lower, limits.upper))
-    assert {one.tobytes() for one in accepted} <= {one.q_m.tobytes() for one in robot.given}
-    assert (np.maximum(limits.lower - accepted, accepted - limits.upper) <= rules.margin).all()
     run, moved = ~stopped[1:], np.abs(np.diff(accepted, axis=0))
-    assert (moved[run] <= (rules.speed * (1 + SMALL) * np.diff(stamped)[run] + SMALL)[:, None]).all()
-    assert ((stamped <= sent) & (np.diff(stamped, prepend=stamped[0]) >= 0)).all()
+    kept = {
+        "finite": np.isfinite(q_d),
+        "range": (limits.lower <= q_d) & (q_d <= limits.upper),
+        "torque": limits.kp * np.abs(q_d - accepted) <= limits.torque * (1 + SMALL) + SMALL,
+        "rate": np.abs(np.diff(q_d, axis=0)) <= limits.rate * (1 + SMALL) * since + SMALL,
+        "begins where the joints are": q_d[0] == np.clip(accepted[0], limits.lower, limits.upper),
+        "believes what was read": {one.tobytes() for one in accepted} <= {one.q_m.tobytes() for one in robot.given},
+        "believes the range": np.maximum(limits.lower - accepted, accepted - limits.upper) <= rules.margin,
+        "believes the speed": moved[run] <= (rules.speed * (1 + SMALL) * np.diff(stamped)[run] + SMALL)[:, None],
+        "time": (stamped <= sent) & (np.diff(stamped, prepend=stamped[0]) >= 0),
+    }
+    return [rule for rule, rows in kept.items() if not np.all(rows)]
 
 
 def change(**fields: Any) -> Spoil:

@@ -143,3 +143,4 @@ def test_every_command_is_safe_whatever_is_read_answered_raised_and_set(
     robot.loop = ControlLoop(Answers(answers), time_constant, limits, rules, homing, seconds, HAND, opened, robot.clock)
     with np.errstate(all="ignore"), contextlib.suppress(TooLongError, StopError, *map(type, ERRORS)):
         drive(robot, limits, rules)
+    assert robot.broken == []
