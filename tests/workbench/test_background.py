@@ -11,19 +11,9 @@ import pytest
 
 from tactile_cube.errors import InputError
 from tactile_cube.identification.in_words import PARTIAL
-from tactile_cube.workbench.background import PHASES, Diagnosing
-from tests.workbench.small_bench import STRIBECK, partly_known, stribeck_recording
-
-
-def test_a_diagnosis_tells_its_progress_and_its_answer(tmp_path: Path) -> None:
-    running = Diagnosing(stribeck_recording(tmp_path), None, (), 0, tmp_path / "found")
-    shares = [running.share for _ in running.lines()]
-    assert shares == sorted(shares)
-    assert set(PHASES.values()) <= set(shares), "what a diagnosis says is that by which its share is known"
-    assert STRIBECK in running.best.replace("(excess, velocity)", "")
-    assert running.found is not None
-    assert running.found.effects == [STRIBECK]
-    assert (tmp_path / "found" / "report.html").is_file()
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.workbench.background import Diagnosing
+from tests.workbench.small_bench import STRIBECK, partly_known
 
 
 def test_an_answer_that_names_no_effect_for_certain_has_those_of_its_model(tmp_path: Path) -> None:
@@ -35,8 +25,8 @@ def test_an_answer_that_names_no_effect_for_certain_has_those_of_its_model(tmp_p
     assert [term.label for term in found.fitted.model.terms] == found.effects
 
 
-def test_a_diagnosis_is_stopped_at_once(tmp_path: Path) -> None:
-    running = Diagnosing(stribeck_recording(tmp_path), None, (), 0, tmp_path / "found")
+def test_a_diagnosis_is_stopped_at_once(measured: Recording, tmp_path: Path) -> None:
+    running = Diagnosing(measured, None, (), 0, tmp_path / "found")
     lines = running.lines()
     next(lines)
     began = time.monotonic()
@@ -53,7 +43,7 @@ from pathlib import Path
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.workbench.background import Diagnosing
 if __name__ == "__main__":
-    running = Diagnosing(read_recording(Path(sys.argv[1])), None, (), 0, Path(sys.argv[1]) / "found")
+    running = Diagnosing(read_recording(Path(sys.argv[1])), None, (), 0, Path(__file__).parent / "found")
     lines = running.lines()
     print(running._process.pid, next(lines), flush=True)
     running.wait()
@@ -61,9 +51,9 @@ if __name__ == "__main__":
 
 
 @pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGKILL])
-def test_a_diagnosis_ends_with_the_workbench_however_it_ends(tmp_path: Path, how: signal.Signals) -> None:
+def test_a_diagnosis_ends_with_the_workbench_however_it_ends(measured, tmp_path, how) -> None:
     (tmp_path / "running.py").write_text(RUNNING)
-    words = [sys.executable, str(tmp_path / "running.py"), str(stribeck_recording(tmp_path).folder)]
+    words = [sys.executable, str(tmp_path / "running.py"), str(measured.folder)]
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as workbench:
         assert workbench.stdout is not None
         diagnosis = int(workbench.stdout.readline().split()[0])
@@ -83,8 +73,7 @@ def _runs(process: int) -> bool:
     return state.exists() and state.read_text().rpartition(")")[2].split()[0] != "Z"
 
 
-def test_what_diagnose_refuses_is_raised_here(tmp_path: Path) -> None:
-    recording = stribeck_recording(tmp_path)
-    running = Diagnosing(recording.with_trials(recording.trials[:1]), None, (), 0, tmp_path / "found")
+def test_what_diagnose_refuses_is_raised_here(measured: Recording, tmp_path: Path) -> None:
+    running = Diagnosing(measured.with_trials(measured.trials[:1]), None, (), 0, tmp_path / "found")
     with pytest.raises(InputError, match="1 trial in all"):
         running.wait()

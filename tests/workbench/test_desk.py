@@ -1,28 +1,12 @@
 """What all windows share, without a window."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.workbench.desk import Desk
-from tests.workbench.small_bench import STRIBECK, stribeck_recording
-
-
-@pytest.fixture(scope="module")
-def measured(tmp_path_factory: pytest.TempPathFactory) -> Recording:
-    return stribeck_recording(tmp_path_factory.mktemp("stribeck"))
-
-
-@pytest.fixture
-def desk(measured: Recording, tmp_path: Path) -> Iterator[Desk]:
-    made = Desk(tmp_path)
-    made.open(str(measured.folder))
-    done(made)
-    yield made
-    made.stop()
+from tests.workbench.small_bench import STRIBECK
 
 
 def done(desk: Desk) -> None:
@@ -31,14 +15,12 @@ def done(desk: Desk) -> None:
         desk._worker.submit(lambda: None).result()
 
 
-def test_two_windows_that_look_do_not_drive_each_other_away(desk: Desk) -> None:
-    for _ in range(3):
-        desk.look("a")
+def test_a_change_is_made_before_the_look_that_it_outdates_and_two_windows_that_look_share_one(
+    measured: Recording, tmp_path: Path
+) -> None:
+    desk = Desk(tmp_path)
+    desk.open(str(measured.folder))
     done(desk)
-    assert desk.looks["a"][0][0].name == "stribeck_friction"
-
-
-def test_a_change_is_made_before_the_look_that_it_outdates_is_finished(desk: Desk) -> None:
     desk.look("a")
     desk.change("adding", lambda bench: bench.add(STRIBECK))
     done(desk)
@@ -47,27 +29,26 @@ def test_a_change_is_made_before_the_look_that_it_outdates_is_finished(desk: Des
     names = [one.name for twins in desk.looks["a"] for one in twins]
     assert "stribeck_friction" not in names, "the model has it"
 
+    desk.open(str(measured.folder))
+    done(desk)
+    assert desk.bench.effects == [], "a recording takes the place of another one"
+    for _ in range(3):
+        desk.look("a")
+    done(desk)
+    assert desk.looks["a"][0][0].name == "stribeck_friction", "windows do not drive each other away"
 
-def test_what_is_refused_is_shown_and_changes_nothing(desk: Desk) -> None:
     version = desk.version
     desk.change("adding", lambda bench: bench.add("stribeck_frition@a"))
     done(desk)
     assert "did you mean stribeck_friction" in desk.problem
-    assert desk.version == version
+    assert desk.version == version, "what is refused changes nothing"
     desk.look("a")
     done(desk)
-    assert desk.problem
-
-
-def test_a_recording_takes_the_place_of_another_one(desk: Desk, measured: Recording) -> None:
-    desk.change("adding", lambda bench: bench.add(STRIBECK))
-    desk.open(str(measured.folder))
-    done(desk)
-    assert desk.bench is not None
-    assert desk.bench.effects == []
+    assert desk.problem, "and is shown until more is asked"
     desk.open(str(measured.folder / "nothing*.csv"))
     done(desk)
     assert "no recording's folder" in desk.problem
+    desk.stop()
 
 
 def test_what_came_back_is_added_to_the_recording_that_is_open(measured: Recording, tmp_path: Path) -> None:

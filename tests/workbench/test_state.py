@@ -1,6 +1,7 @@
 """The workbench without a browser: what a notebook does in ten lines."""
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -10,18 +11,30 @@ from tactile_cube.drivetrain.model_file import read_model
 from tactile_cube.errors import InputError
 from tactile_cube.identification.identification import identify_effects
 from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.workbench.background import PHASES
 from tactile_cube.workbench.state import Look, Workbench
-from tests.workbench.small_bench import HIDDEN, OWN, STRIBECK, stribeck_recording
+from tests.workbench.small_bench import HIDDEN, OWN, STRIBECK
 
 
 @pytest.fixture(scope="module")
-def measured(tmp_path_factory: pytest.TempPathFactory) -> Recording:
-    return stribeck_recording(tmp_path_factory.mktemp("stribeck"))
+def opened(measured: Recording) -> Workbench:
+    return Workbench(measured)
 
 
 @pytest.fixture
-def bench(measured: Recording) -> Workbench:
-    return Workbench(measured)
+def bench(opened: Workbench) -> Iterator[Workbench]:
+    """As it was opened."""
+    yield opened
+    while opened.undo():
+        pass
+
+
+@pytest.fixture(scope="module")
+def explained(measured: Recording) -> Workbench:
+    """With the effect that is hidden in the recording, which a test leaves as it is."""
+    bench = Workbench(measured)
+    bench.add(STRIBECK)
+    return bench
 
 
 def test_ten_lines_lead_from_a_recording_to_a_model_at_the_noise(bench: Workbench, tmp_path: Path) -> None:
@@ -43,16 +56,16 @@ def test_ten_lines_lead_from_a_recording_to_a_model_at_the_noise(bench: Workbenc
     assert (tmp_path / "model" / "report.html").is_file()
 
 
-def test_what_any_law_could_explain_is_little_once_the_effect_is_there(bench: Workbench) -> None:
+def test_what_any_law_could_explain_is_little_once_the_effect_is_there(bench: Workbench, explained: Workbench) -> None:
     assert bench.explainable("a") > 0.8
-    bench.add(STRIBECK)
-    assert bench.explainable("a") < 0.2
+    assert explained.explainable("a") < 0.2
+    names = [one.name for twins in explained.candidates("a") or [] for one in twins]
+    assert "stribeck_friction" not in names, "what the model has is offered no more"
 
 
-def test_the_error_by_stage_is_that_of_identify(bench: Workbench, measured: Recording) -> None:
-    bench.add(STRIBECK)
+def test_the_error_by_stage_is_that_of_identify(explained: Workbench, measured: Recording) -> None:
     stages = identify_effects(measured, [STRIBECK], say=lambda line: None).stages
-    mine = {stage.label: stage.errors.overall for stage in bench.stages}
+    mine = {stage.label: stage.errors.overall for stage in explained.stages}
     assert mine["stated"] == stages["nominal"].overall
     assert mine["refitted"] == pytest.approx(stages["refitted"].overall, rel=1e-6)
     assert mine[f"+ {STRIBECK}"] == pytest.approx(stages[f"+ {STRIBECK}"].overall, rel=0.1)  # which fits all windows
@@ -95,8 +108,13 @@ def test_an_effect_is_taken_out_again(bench: Workbench) -> None:
         bench.remove("backlash@a")
 
 
-def test_the_signature_of_the_true_effect_looks_like_what_is_missing(bench: Workbench) -> None:
-    missing, (best, *others) = bench.missing("a"), [one for twins in bench.candidates("a") or [] for one in twins]
+@pytest.fixture(scope="module")
+def looks(opened: Workbench) -> list[list[Look]]:
+    return opened.candidates("a") or []
+
+
+def test_the_signature_of_the_true_effect_looks_like_what_is_missing(bench: Workbench, looks: list[list[Look]]) -> None:
+    missing, (best, *others) = bench.missing("a"), [one for twins in looks for one in twins]
 
     def alike(look: Look) -> float:
         return float(np.corrcoef(missing.torque, bench.signature(look).torque)[0, 1])
@@ -105,8 +123,8 @@ def test_the_signature_of_the_true_effect_looks_like_what_is_missing(bench: Work
     assert alike(best) > max(alike(one) for one in others if one.name == "cogging")
 
 
-def test_effects_that_these_trials_do_not_tell_apart_stand_together(bench: Workbench) -> None:
-    groups = [{one.name for one in twins} for twins in bench.candidates("a") or []]
+def test_effects_that_these_trials_do_not_tell_apart_stand_together(looks: list[list[Look]]) -> None:
+    groups = [{one.name for one in twins} for twins in looks]
     assert {"asymmetric_friction", "coulomb_friction"} <= next(one for one in groups if "coulomb_friction" in one)
     assert {"cogging"} in groups
 
@@ -117,11 +135,10 @@ def test_where_the_model_fails_is_what_compare_says(bench: Workbench) -> None:
     assert compared.floor == bench.floor
 
 
-def test_an_experiment_is_proposed_for_the_effect_that_was_added(bench: Workbench) -> None:
+def test_an_experiment_is_proposed_for_the_effect_that_was_added(bench: Workbench, explained: Workbench) -> None:
     with pytest.raises(InputError, match="add an effect first"):
         bench.propose()
-    bench.add(STRIBECK)
-    proposed = bench.propose()
+    proposed = explained.propose()
     assert proposed.decides
     assert set(proposed.predictions) == {"refitted", f"+ {STRIBECK}"}
 
@@ -131,12 +148,11 @@ def test_what_cannot_be_seen_is_named_with_its_reason(bench: Workbench) -> None:
     assert bench.unseen("a")
 
 
-def test_a_saved_model_is_the_next_one_to_begin_with(bench: Workbench, measured: Recording, tmp_path: Path) -> None:
-    bench.add(STRIBECK)
-    bench.save(tmp_path)
+def test_a_saved_model_is_the_next_one_to_begin_with(explained: Workbench, measured: Recording, tmp_path: Path) -> None:
+    explained.save(tmp_path)
     again = Workbench(measured, tmp_path / "model.yaml")
     assert again.effects == [STRIBECK]
-    assert again.stages[0].errors.overall < 0.1 * bench.stages[0].errors.overall
+    assert again.stages[0].errors.overall < 0.1 * explained.stages[0].errors.overall
     assert again.stages[1].over_noise < 1.5
 
 
@@ -158,9 +174,16 @@ def test_a_first_look_gives_way_to_whoever_waits(bench: Workbench) -> None:
     assert len(asked) == 2
 
 
-def test_the_error_is_that_of_diagnose_before_and_after_its_model_is_taken(bench: Workbench, tmp_path: Path) -> None:
-    found = bench.diagnose(tmp_path).wait()
+def test_a_diagnosis_tells_its_progress_and_the_errors_before_and_after_its_model_is_taken(bench, tmp_path) -> None:
+    running = bench.diagnose(tmp_path)
+    shares = [running.share for _ in running.lines()]
+    assert shares == sorted(shares)
+    assert set(PHASES.values()) <= set(shares), "what a diagnosis says is that by which its share is known"
+    assert STRIBECK in running.best.replace("(excess, velocity)", "")
+    found = running.found
     assert found is not None
+    assert found.effects == [STRIBECK]
+    assert (tmp_path / "report.html").is_file()
     answer = json.loads((tmp_path / "diagnosis.json").read_text())
     bench.adopt(found)
     assert [stage.label for stage in bench.stages] == ["stated", "refitted", f"+ {STRIBECK}"]
@@ -174,7 +197,8 @@ def test_the_error_is_that_of_diagnose_before_and_after_its_model_is_taken(bench
     assert saved.effects == read_model(tmp_path / "model.yaml").effects
 
 
-def test_a_number_is_fixed_and_another_one_bounded_in_every_refit(bench: Workbench) -> None:
+def test_a_number_is_fixed_and_another_one_bounded_in_every_refit(measured: Recording) -> None:
+    bench = Workbench(measured)
     found = {one.key: one for one in bench.values("a")}
     bench.set_parameter("kd@a", 0.24)
     bench.bound("kd@a", 0.24, 0.24)
@@ -191,9 +215,3 @@ def test_a_number_is_fixed_and_another_one_bounded_in_every_refit(bench: Workben
     assert {one.key: one for one in bench.values("a")}["kd@a"].value != 0.24
     with pytest.raises(InputError, match=r"kd@a: bounds 2 to 1; give the smaller one first, both within"):
         bench.bound("kd@a", 2.0, 1.0)
-
-
-def test_what_the_model_has_is_offered_no_more(bench: Workbench) -> None:
-    bench.add(STRIBECK)
-    names = [one.name for twins in bench.candidates("a") or [] for one in twins]
-    assert "stribeck_friction" not in names
