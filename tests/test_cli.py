@@ -74,17 +74,11 @@ def test_a_command_leaves_the_environment_of_later_programs_as_it_was(monkeypatc
         ("record", ["source=csv", "source.xyzzy=5"], "source.xyzzy: no such setting; --help lists them"),
         ("diagnose", ["recording=a", "effects=my.Drag"], "effects=my.Drag: expected a list of names: 'effects=[NAME@"),
         ("identify", ["recording=a", "effects=[1]"], "effects=[1]: expected a list of names"),
-        (
-            "identify",
-            ["effects=[backlash(play)@a]"],
-            "no viable alternative at input '[backlash(play)@': quote what",
-        ),
+        ("identify", ["effects=[backlash(play)@a]"], "no viable alternative at input '[backlash(play)@': quote what"),
         ("diagnose", [], "give either recording=FOLDER (of a recording.yaml) or logs to import: source=csv"),
     ],
 )
-def test_a_mistyped_command_line_is_told_what_was_meant(
-    name: str, words: list[str], said: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_mistyped_command_line_is_told_what_was_meant(name, words, said, monkeypatch, capsys) -> None:
     monkeypatch.setattr(sys, "argv", [name, *words])
     with pytest.raises(SystemExit, match="2"):
         cli.command_line(name)()

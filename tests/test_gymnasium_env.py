@@ -93,9 +93,7 @@ def test_another_render_mode_is_refused() -> None:
         GymnasiumRotation(EnvConfig(Task("full")), render_mode="human")
 
 
-def test_success_is_that_of_evaluate_told_in_the_last_step(
-    env: GymnasiumRotation, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_success_is_that_of_evaluate_told_in_the_last_step(env, monkeypatch) -> None:
     judged = []
 
     def judge_episode(record: EpisodeRecord) -> SimpleNamespace:

@@ -16,9 +16,7 @@ from tactile_cube.run_folder import console_kept_in
 from tactile_cube.whole_file import write_whole
 
 
-def test_lines_errors_and_lines_in_place_are_kept_without_colours(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_lines_errors_and_lines_in_place_are_kept_without_colours(tmp_path, capsys) -> None:
     log = tmp_path / "train.log"
     with console_kept_in(log):
         print("starts")

@@ -129,9 +129,7 @@ def test_bfloat16_follows_float32_roughly() -> None:
 
 
 @pytest.mark.parametrize(("supported", "dtype"), [(True, torch.bfloat16), (False, torch.float32)])
-def test_automatic_precision_is_what_the_processor_multiplies(
-    supported: bool, dtype: torch.dtype, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_automatic_precision_is_what_the_processor_multiplies(supported, dtype, monkeypatch) -> None:
     monkeypatch.setattr("tactile_cube.agent.agent.multiplies_bfloat16", lambda: supported)
     agent = made(PlainSac, precision="auto")
     assert agent.settings.product_dtype == dtype

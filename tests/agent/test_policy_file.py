@@ -98,9 +98,7 @@ def strange(header: int = 0, **info: object) -> bytes:
         (b"\x02\0\0\0\0\0\0\0{}", "damaged or not a policy file"),
     ],
 )
-def test_a_file_that_claims_what_it_is_not_is_refused_by_every_reader(
-    tmp_path: Path, content: bytes, reason: str
-) -> None:
+def test_a_file_that_claims_what_it_is_not_is_refused_by_every_reader(tmp_path, content, reason) -> None:
     path = tmp_path / "p.safetensors"
     path.write_bytes(strange())
     read_policy(path)

@@ -56,9 +56,7 @@ def trained(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, str, int]]:
     return asked
 
 
-def test_each_stage_goes_on_from_the_one_before_and_the_screen_says_what_is_mastered(
-    tmp_path: Path, trained: list[Any], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_each_stage_goes_on_from_the_one_before_and_the_screen_says_what_is_mastered(tmp_path, trained, capsys) -> None:
     result = tactile_cube.train(experiment="curriculum", values={"training.steps": 50}, folder=tmp_path)
     before = ["None", f"{tmp_path}/gaiting/checkpoint.pt", f"{tmp_path}/holding/checkpoint.pt"]
     assert trained == list(zip(NAMES, before, (100, 50, 0), strict=True))
@@ -137,9 +135,7 @@ def interrupted_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(training, "_in_one", before)
 
 
-def test_an_interrupted_training_goes_on_in_its_stage_and_comes_to_the_same_policy(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_interrupted_training_goes_on_in_its_stage_and_comes_to_the_same_policy(tmp_path, monkeypatch) -> None:
     whole = tactile_cube.train(values=TINY, folder=tmp_path / "whole")
     interrupted_once(monkeypatch)
     parts = tmp_path / "parts"

@@ -55,9 +55,7 @@ class Answers(http.server.BaseHTTPRequestHandler):
         ("answers", True, False, False),
     ],
 )
-def test_torch_comes_without_cuda_where_no_gpu_is_and_its_index_answers(
-    kind: str, gpu: bool, asked: bool, said: bool, tmp_path: Path
-) -> None:
+def test_torch_comes_without_cuda_where_no_gpu_is_and_its_index_answers(kind, gpu, asked, said, tmp_path) -> None:
     programs = {
         "python": f'if [ "$1" = -m ]; then echo "$@" >> {tmp_path}/pip; else exec {sys.executable} "$@"; fi',
         "nvidia-smi": f"exit {0 if gpu else 9}",

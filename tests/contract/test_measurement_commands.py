@@ -99,12 +99,9 @@ def lerobot_set(folder: Path, delay: float = 0.0, limit: float = np.inf) -> None
 
 
 @pytest.mark.parametrize(
-    ("hidden", "named", "within"),
-    [({"delay": DELAY}, "command_delay", 0.002), ({"limit": LIMIT}, "rate_limit", 0.02)],
+    ("hidden", "named", "within"), [({"delay": DELAY}, "command_delay", 0.002), ({"limit": LIMIT}, "rate_limit", 0.02)]
 )
-def test_from_a_lerobot_data_set_to_a_named_effect_by_one_command(
-    hidden: dict[str, float], named: str, within: float, tmp_path: Path
-) -> None:
+def test_from_a_lerobot_data_set_to_a_named_effect_by_one_command(hidden, named, within, tmp_path) -> None:
     lerobot_set(tmp_path / "set", **hidden)
     (tmp_path / "arm.urdf").write_text(ARM)
     words = ["source=csv", "source.files=set", "source.urdf=arm.urdf", "source.angle_unit=deg", "hydra.run.dir=run"]

@@ -187,9 +187,7 @@ def results(folder: Path) -> dict[str, tuple[Callable[[Path], object], str]]:
 
 
 @pytest.mark.parametrize("command", ["compare", "identify", "diagnose", "monitor"])
-def test_a_measuring_command_leaves_old_or_new(
-    command: str, results: dict[str, tuple[Callable[[Path], object], str]], tmp_path: Path
-) -> None:
+def test_a_measuring_command_leaves_old_or_new(command, results, tmp_path) -> None:
     write, index = results[command]
     assert crash_everywhere(tmp_path, write, 6, index) >= 12
 

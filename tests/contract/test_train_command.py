@@ -86,9 +86,7 @@ def test_fine_tuning_goes_on_from_the_shipped_policy(tmp_path: Path) -> None:
         (["+experiment=smoke", "collector.worlds=0"], "error: collector.worlds=0: Input should be greater than 0\n"),
     ],
 )
-def test_wrong_choices_and_values_end_with_one_line_exit_code_2_and_no_folder(
-    tmp_path: Path, arguments: list[str], message: str
-) -> None:
+def test_wrong_choices_and_values_end_with_one_line_exit_code_2_and_no_folder(tmp_path, arguments, message) -> None:
     run = train(*arguments, folder=tmp_path)
     assert (run.returncode, run.stderr.count("\n"), run.stderr.startswith("error: ")) == (2, 1, True)
     assert message in run.stderr
@@ -193,9 +191,7 @@ def test_a_reader_that_leaves_ends_a_command_quietly(words: list[str], tmp_path:
     assert (run.returncode, run.stderr) == (141, b"")
 
 
-def test_a_sweep_goes_past_a_run_that_fails_says_what_came_of_it_and_is_given_again_for_the_rest(
-    tmp_path: Path,
-) -> None:
+def test_a_sweep_goes_past_a_run_that_fails_says_what_came_of_it_and_is_given_again_for_the_rest(tmp_path) -> None:
     short = ["+experiment=smoke", "collector=single", "collector.worlds=4", "training.steps=80", "logger=csv"]
     first = train("-m", *short, "seed=0,-1", folder=tmp_path)
     assert first.returncode == 1

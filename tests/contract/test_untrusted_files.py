@@ -5,7 +5,6 @@ import hashlib
 import io
 import os
 import sys
-from collections.abc import Callable
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -111,9 +110,7 @@ def deployed(config: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize("name", EVIL)
 @pytest.mark.parametrize("reader", [evaluated, deployed])
-def test_whatever_a_configuration_asks_for_is_refused_before_any_of_it_is_made(
-    reader: Callable[[dict[str, Any]], None], name: str
-) -> None:
+def test_whatever_a_configuration_asks_for_is_refused_before_any_of_it_is_made(reader, name) -> None:
     config = with_evil(name)
     with pytest.raises(InputError, match=EVIL[name][1]) as told:
         reader(config)
@@ -207,9 +204,7 @@ def typed(
 @pytest.mark.parametrize(
     ("name", "damage"), [*((name, "") for name in MAKING), *((name, "flipped") for name in COMMANDS)]
 )
-def test_a_command_that_takes_a_policy_runs_nothing_of_it(
-    name: str, damage: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_command_that_takes_a_policy_runs_nothing_of_it(name, damage, monkeypatch, capfd) -> None:
     config = with_evil("a class below the hand's")
     policy(Path("evil.safetensors"), config, damage)
     policy(Path("run/policy_1.safetensors"), config, damage)
@@ -264,9 +259,7 @@ BAD_STATES = {
     "words", [[], ["training.init_from=next", "hydra.run.dir=other"]], ids=["resumed", "begun with"]
 )
 @pytest.mark.parametrize("name", BAD_STATES)
-def test_a_run_takes_nothing_from_a_bad_checkpoint(
-    name: str, words: list[str], monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_run_takes_nothing_from_a_bad_checkpoint(name, words, monkeypatch, capfd) -> None:
     bad, reason = BAD_STATES[name]
     checkpoint(bad)
     status, said = typed("train", ["+experiment=smoke", *RUN, *words], monkeypatch, capfd)

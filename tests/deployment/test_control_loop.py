@@ -291,9 +291,7 @@ def test_a_finger_that_is_pushed_faster_than_its_command_may_follow_is_not_belie
     ("wanted", "sent"),
     [(np.nan, HOME), (np.inf, HOME), (-np.inf, HOME), (1e308, HOME + 6.28e-3), (-1e308, HOME - 6.28e-3)],
 )
-def test_whatever_is_wanted_of_the_guard_a_command_that_keeps_all_limits_comes_out(
-    wanted: float, sent: np.ndarray
-) -> None:
+def test_whatever_is_wanted_of_the_guard_a_command_that_keeps_all_limits_comes_out(wanted, sent) -> None:
     guard = CommandGuard(LIMITS, RULES, DLR_HAND2.joint_names)
     assert guard.accept(0.0, Reading(0.0, HOME)) == ""
     np.testing.assert_array_equal(first := guard.checked(np.nan, HOME + 1.0), HOME)
@@ -328,9 +326,7 @@ def test_the_log_can_be_read_while_it_grows_and_says_what_the_disk_refuses(tmp_p
         pass
 
 
-def test_the_memory_that_a_recording_of_a_run_takes_does_not_grow_with_the_run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_memory_that_a_recording_of_a_run_takes_does_not_grow_with_the_run(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(writing, "BLOCK", 1000)
     signals = [(name, "<f8", (12,)) for name in ("position", "command", "torque")]
     peaks = []

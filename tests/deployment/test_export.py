@@ -28,9 +28,7 @@ def observation() -> np.ndarray:
     return np.random.default_rng(1).normal(0.0, 0.5, (7, 120)).astype(np.float32)
 
 
-def test_the_onnx_graph_is_the_network_and_carries_the_contract(
-    network: Network, observation: np.ndarray, tmp_path: Path
-) -> None:
+def test_the_onnx_graph_is_the_network_and_carries_the_contract(network, observation, tmp_path) -> None:
     onnx, reference = pytest.importorskip("onnx"), pytest.importorskip("onnx.reference")
     path = tmp_path / "policy.onnx"
     beside = json.loads(export_policy(network, path).read_text())
@@ -56,9 +54,7 @@ def test_the_contract_says_which_hand_it_is_and_how_it_is_held(network: Network)
     np.testing.assert_allclose(gaps, 0.001, atol=1e-3)  # 1 mm off a cube of 8 cm, by angles rounded to 0.1 deg
 
 
-def test_every_exported_file_has_a_contract_of_its_own(
-    network: Network, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_every_exported_file_has_a_contract_of_its_own(network, tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(export, "_write_onnx", lambda network, contract, path: path.write_bytes(b"a graph"))
     beside = [export_policy(network, tmp_path / name) for name in ("policy.npz", "policy.onnx")]
     assert [path.name for path in beside] == ["policy.npz.contract.json", "policy.onnx.contract.json"]
@@ -72,9 +68,7 @@ def test_an_unknown_ending_is_refused(network: Network, tmp_path: Path) -> None:
         export_policy(network, tmp_path / "policy.pt")
 
 
-def test_the_test_vector_and_the_hashes_tell_whether_a_file_is_what_was_exported(
-    network: Network, tmp_path: Path
-) -> None:
+def test_the_test_vector_and_the_hashes_tell_whether_a_file_is_what_was_exported(network, tmp_path) -> None:
     path = tmp_path / "policy.npz"
     contract = json.loads(export_policy(network, path).read_text())
     assert "config" not in contract["policy"]

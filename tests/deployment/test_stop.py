@@ -117,9 +117,7 @@ def _silent_errors() -> Any:
     failed=st.lists(st.tuples(st.integers(0, 250), st.sampled_from(["in_send", "in_wait", "in_read"])), max_size=30),
     again=st.lists(st.tuples(st.integers(0, 300), st.sampled_from(SIGNALS[:5])), max_size=3),
 )
-def test_the_last_command_presses_on_nothing(
-    clock: str, way: str, failed: list[tuple[int, str]], again: list[tuple[int, str]]
-) -> None:
+def test_the_last_command_presses_on_nothing(clock, way, failed, again) -> None:
     robot = FollowingRobot(HOME, follow=0.0)
     CLOCKS[clock](robot)
     WAYS[way](robot)

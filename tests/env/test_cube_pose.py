@@ -35,9 +35,7 @@ def test_theta_is_unwrapped_step_by_step_over_several_turns() -> None:
 @pytest.mark.parametrize(
     ("axis", "along"), [("x", (1, 0, 0)), ("y", (0, 1, 0)), ("z", (0, 0, 1)), ((3.0, 4.0, -12.0), (3, 4, -12))]
 )
-def test_a_turn_about_the_tasks_axis_is_theta_and_any_other_is_tilt(
-    axis: str | tuple[float, ...], along: tuple[float, ...]
-) -> None:
+def test_a_turn_about_the_tasks_axis_is_theta_and_any_other_is_tilt(axis, along) -> None:
     vector = Task("table", axis=axis).axis_vector()
     np.testing.assert_allclose(vector, np.array(along) / np.linalg.norm(along))
     turned = seen_along(frame_along(vector), Rotation.from_rotvec(0.7 * vector).as_quat().tolist())

@@ -73,9 +73,7 @@ def test_climb_is_the_squared_height_above_the_start_and_a_lower_object_costs_no
         ([0, 0, 0, 0], [0, 0, 0, 0], (0.0, 0.0, 0.0)),
     ],
 )
-def test_three_tips_support_and_other_links_have_a_share(
-    links: list[float], tips: list[float], expected: tuple[float, ...]
-) -> None:
+def test_three_tips_support_and_other_links_have_a_share(links, tips, expected) -> None:
     held = step(forces=np.array([links, tips], dtype=float))
     assert (terms.tips(held), terms.links(held), terms.link_force(held)) == pytest.approx(expected)
 

@@ -23,9 +23,7 @@ def test_actions_span_the_published_range_of_joint_angles(scripted_world: Any, r
 
 
 @pytest.mark.parametrize("direction", [1, -1])
-def test_theta_counts_turns_in_the_tasks_direction(
-    direction: int, scripted_world: Any, rotation_task: MakeTask
-) -> None:
+def test_theta_counts_turns_in_the_tasks_direction(direction, scripted_world, rotation_task) -> None:
     begins_turned = Randomization(cube_rotation=(Constant(0.0), Constant(0.0), Constant(0.3)))
     task = Task("full", direction=direction)
     env = rotation_task(scripted_world(turn=0.08 * direction), task=task, randomization=begins_turned)
@@ -58,9 +56,7 @@ def test_a_moment_tells_the_state_of_its_world(scripted_world: Any, rotation_tas
 
 
 @pytest.mark.parametrize(("symmetry", "period"), [(4, 0.5 * np.pi), (1, 2 * np.pi)])
-def test_critics_see_the_yaw_up_to_the_symmetry(
-    symmetry: int, period: float, scripted_world: Any, rotation_task: MakeTask
-) -> None:
+def test_critics_see_the_yaw_up_to_the_symmetry(symmetry, period, scripted_world, rotation_task) -> None:
     env = rotation_task(scripted_world(turn=period / 20), task=Task("full", direction=1, symmetry=symmetry))
     first = env.reset().object_state[3:5].copy()
     seen = [env.step(np.zeros(12)).object_state[3:5].copy() for _ in range(20)]
@@ -111,9 +107,7 @@ def test_the_time_limit_truncates(rotation_task: MakeTask) -> None:
         ("tilted", {"turn": 0.9}),
     ],
 )
-def test_a_lost_cube_terminates_and_costs(
-    outcome: str, motion: dict[str, Any], scripted_world: Any, rotation_task: MakeTask
-) -> None:
+def test_a_lost_cube_terminates_and_costs(outcome, motion, scripted_world, rotation_task) -> None:
     env = rotation_task(scripted_world(**motion), task=Task("full", axis="x" if outcome == "tilted" else "z"))
     env.reset()
     last = env.step(np.zeros(12))
@@ -123,9 +117,7 @@ def test_a_lost_cube_terminates_and_costs(
 
 
 @pytest.mark.parametrize("damage", ["unhealthy", "not a number"])
-def test_faulty_physics_ends_the_episode_with_finite_numbers(
-    damage: str, scripted_world: Any, rotation_task: MakeTask
-) -> None:
+def test_faulty_physics_ends_the_episode_with_finite_numbers(damage, scripted_world, rotation_task) -> None:
     world = scripted_world()
     env = rotation_task(world)
     before = env.reset()

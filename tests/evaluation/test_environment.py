@@ -41,9 +41,7 @@ def test_a_policy_is_not_tried_on_another_hand_or_in_two_engines() -> None:
         (["protocol=standard", "start=wide_yaw"], {"randomization": "as in training", "start": "wide_yaw"}),
     ],
 )
-def test_protocols_of_the_paper_draw_its_worlds_unless_others_are_named(
-    words: list[str], drawn: dict[str, str]
-) -> None:
+def test_protocols_of_the_paper_draw_its_worlds_unless_others_are_named(words, drawn) -> None:
     job, policy = worded_job("evaluate", tuple(words)), find_policy("published")
     made = environment(job.config, policy, job.choices)
     assert worlds(job.config, policy, job.choices) == drawn

@@ -12,10 +12,7 @@ from tactile_cube.randomization import Randomization, Uniform
 from tactile_cube.transforms import EnvConfig
 
 
-@pytest.mark.parametrize(
-    "wrong",
-    [{"episodes": 0}, {"seconds": -1.0}, {"variants": ()}, {"film": -1}, {"worlds": "x"}],
-)
+@pytest.mark.parametrize("wrong", [{"episodes": 0}, {"seconds": -1.0}, {"variants": ()}, {"film": -1}, {"worlds": "x"}])
 def test_impossible_protocols_are_refused_by_key(wrong: dict[str, Any]) -> None:
     with pytest.raises(InputError, match=f"protocol.{next(iter(wrong))}"):
         Protocol("x", **wrong)

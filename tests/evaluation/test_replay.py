@@ -1,6 +1,3 @@
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -20,9 +17,7 @@ def displacement(env: RotationEnv, seed: int) -> tuple[np.ndarray, np.ndarray]:
     return after.cube_position - before.cube_position, turn.as_rotvec()
 
 
-def test_the_cube_starts_half_a_millimetre_and_a_hundredth_of_a_radian_aside(
-    scripted_world: Any, rotation_task: Callable[..., RotationEnv]
-) -> None:
+def test_the_cube_starts_half_a_millimetre_and_a_hundredth_of_a_radian_aside(scripted_world, rotation_task) -> None:
     env = rotation_task(scripted_world())
     shift, turn = (np.array(rows) for rows in zip(*(displacement(env, seed) for seed in range(200)), strict=True))
     np.testing.assert_allclose(shift.std(axis=0), [5e-4, 5e-4, 0.0], rtol=0.2)
@@ -30,9 +25,7 @@ def test_the_cube_starts_half_a_millimetre_and_a_hundredth_of_a_radian_aside(
     assert np.abs(shift.mean(axis=0)).max() < 2e-4, "to either side"
 
 
-def test_the_cube_is_displaced_once_and_equally_by_equal_seeds(
-    scripted_world: Any, rotation_task: Callable[..., RotationEnv]
-) -> None:
+def test_the_cube_is_displaced_once_and_equally_by_equal_seeds(scripted_world, rotation_task) -> None:
     env = rotation_task(scripted_world())
     np.testing.assert_array_equal(displacement(env, 3), displacement(env, 3))
     later = env.world.start

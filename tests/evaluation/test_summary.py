@@ -20,9 +20,7 @@ def results(*angles: float) -> list[EpisodeResult]:
         (0.0, 400, False),
     ],
 )
-def test_success_is_fifteen_radians_in_forty_seconds_whatever_other_episodes_did(
-    angle: float, steps: int, success: bool
-) -> None:
+def test_success_is_fifteen_radians_in_forty_seconds_whatever_other_episodes_did(angle, steps, success) -> None:
     assert judge_episode(episode(angle=angle, steps=steps)).success == success
 
 

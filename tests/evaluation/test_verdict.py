@@ -35,9 +35,7 @@ from tests.evaluation.synthetic import SPOTS, contacts, episode
         (0.1, 0.0, 0, True, EpisodeVerdict.DROPPED),
     ],
 )
-def test_verdicts_follow_their_definitions(
-    angle: float, late: float, changes: int, lost: bool, expected: EpisodeVerdict
-) -> None:
+def test_verdicts_follow_their_definitions(angle, late, changes, lost, expected) -> None:
     assert verdict(angle, late, changes, lost=lost) == expected
 
 
@@ -201,8 +199,6 @@ def table(*rows: tuple[int, int, bool, float]) -> ContactTable:
         ([(1, 0, True, 0.0)], (0.0, 0.0, 0.0)),
     ],
 )
-def test_what_bears_the_cube_in_two_steps(
-    rows: list[tuple[int, int, bool, float]], expected: tuple[float, ...]
-) -> None:
+def test_what_bears_the_cube_in_two_steps(rows, expected) -> None:
     found = support(episode(steps=2, contacts=table(*rows)))
     assert (found["tip_support"], found["link_contact"], found["link_force_share"]) == expected

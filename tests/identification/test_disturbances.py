@@ -99,11 +99,7 @@ def test_commands_logged_late_are_taken_earlier_and_said(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize(
-    ("effect", "values"),
-    [
-        ("integral_action", {"ki": 75.0, "lag": 0.06}),
-        ("elasticity", {"compliance": 0.03}),
-    ],
+    ("effect", "values"), [("integral_action", {"ki": 75.0, "lag": 0.06}), ("elasticity", {"compliance": 0.03})]
 )
 def test_what_seems_to_know_its_commands_early_is_told_from_commands_that_were_logged_late(
     effect: str, values: dict[str, float], tmp_path: Path

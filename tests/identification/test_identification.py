@@ -25,9 +25,7 @@ def test_the_parameters_to_fit_are_named_as_a_diagnosis_names_them(tmp_path: Pat
 
 
 @pytest.mark.parametrize(("less", "sign"), [(3.0, 1.0), (5.0, -1.0)])
-def test_of_starts_that_noise_cannot_tell_apart_the_usual_one_is_taken(
-    less: float, sign: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_of_starts_that_noise_cannot_tell_apart_the_usual_one_is_taken(less, sign, monkeypatch) -> None:
     monkeypatch.setattr(identification, "residual_candidates", lambda *_: [])
     search = SimpleNamespace(
         shooting=SimpleNamespace(sizes={"a": FINGER}),

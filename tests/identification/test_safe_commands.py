@@ -47,9 +47,7 @@ STATED = 'lower="-0.5" upper="0.5" effort="1" velocity="10"'
         ('lower="-1e9" upper="1e9" effort="1e9" velocity="1e9"', 1.0, ("trials", "trials", "controller")),
     ],
 )
-def test_limits_are_those_that_are_stated_else_what_the_trials_reached(
-    tmp_path: Path, limit: str, torque: float, sources: tuple[str, ...]
-) -> None:
+def test_limits_are_those_that_are_stated_else_what_the_trials_reached(tmp_path, limit, torque, sources) -> None:
     recording = read_recording(
         write(tmp_path, lambda data: data["controller"].update(torque_limit=torque), urdf=URDF.replace(STATED, limit))
     )
@@ -84,9 +82,7 @@ def limits(by: str) -> Limits:
         (envelope(-np.inf, 1.0, 0.0, 0.0), np.inf),
     ],
 )
-def test_a_margin_is_kept_of_each_stated_limit_and_no_motion_that_ran_away_is_within(
-    reached: Envelope, used: float
-) -> None:
+def test_a_margin_is_kept_of_each_stated_limit_and_no_motion_that_ran_away_is_within(reached, used) -> None:
     assert share_used(reached, limits("URDF").allowed(0.1)) == pytest.approx(used)
     assert within_limits(reached, limits("URDF"), 0.1) == (used <= 1.0)
 
@@ -144,9 +140,7 @@ def unbounded(rivals: Rivals) -> list[str]:
 
 
 @pytest.mark.parametrize("name", ALLOWED)
-def test_a_safe_command_of_any_kind_stays_within_the_limits_in_every_model(
-    name: str, request: pytest.FixtureRequest
-) -> None:
+def test_a_safe_command_of_any_kind_stays_within_the_limits_in_every_model(name, request) -> None:
     rivals: Rivals = request.getfixturevalue(name)
     assert unbounded(rivals), "there is something to scale down"
     low, high, speed, torque = np.array(ALLOWED[name]).T

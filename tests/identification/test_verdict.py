@@ -174,9 +174,7 @@ def test_a_drift_as_slow_as_can_be_told_is_no_implausible_law() -> None:
 @pytest.mark.parametrize(
     ("left", "kind"), [(1.1, "missing_effect"), (2.0, "partly_explained"), (4.0, "unknown_effect")]
 )
-def test_a_set_that_leaves_more_than_is_tolerated_is_the_whole_only_if_it_explains_nearly_all(
-    left: float, kind: str
-) -> None:
+def test_a_set_that_leaves_more_than_is_tolerated_is_the_whole_only_if_it_explains_nearly_all(left, kind) -> None:
     assert decide(findings(9.0, explanation("backlash", left, 9.0))).kind == kind
     assert decide(findings(90.0, explanation("backlash", left, 90.0))).kind == "missing_effect"
 

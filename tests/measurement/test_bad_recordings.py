@@ -66,9 +66,7 @@ def swap(columns: Table) -> None:
         (drop(*range(3, 300)), ("has 3 samples, last row 2",)),
     ],
 )
-def test_columns_that_no_machine_gives_are_named_with_row_and_value(
-    tmp_path: Path, spoil: Spoil, said: tuple[str, ...]
-) -> None:
+def test_columns_that_no_machine_gives_are_named_with_row_and_value(tmp_path, spoil, said) -> None:
     message = error_of(write(tmp_path, spoil=spoil))
     assert [words for words in said if words not in message] == []
 
@@ -309,9 +307,7 @@ def test_a_name_that_leads_out_of_the_folder_is_refused(tmp_path: Path, name: st
 
 
 @pytest.mark.parametrize("ending", ["parquet", "csv", "npz"])
-def test_a_table_is_refused_by_its_size_before_it_is_read(
-    tmp_path: Path, ending: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_table_is_refused_by_its_size_before_it_is_read(tmp_path, ending, monkeypatch) -> None:
     path, columns = with_first(tmp_path, f"first.{ending}"), table()
     if ending == "npz":
         np.savez(path, **columns)
@@ -360,9 +356,7 @@ def test_more_missing_samples_than_there_are_is_an_error(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize(("file", "reader"), [("trial.parquet", "scan_parquet"), ("trial.csv", "read_csv")])
-def test_a_reader_that_panics_means_a_damaged_file(
-    file: str, reader: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_reader_that_panics_means_a_damaged_file(file, reader, tmp_path, monkeypatch) -> None:
     def panic(*_: object, **__: object) -> None:
         raise polars.exceptions.PanicException("Thrift out of range\nsecond line")
 

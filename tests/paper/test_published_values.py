@@ -113,10 +113,7 @@ PUBLISHED: dict[str, list[Row]] = {
         ("env.task.gravity_scale", 0.05, "P, Table I: weight reduced by 95 %"),
     ],
     "train task=table": [("env.task.table", True, "P, Table I"), ("env.task.gravity_scale", 1.0, "P, Table I")],
-    "evaluate protocol=paper": [
-        ("protocol.episodes", 10, "P"),
-        ("protocol.seconds", 40, "P"),
-    ],
+    "evaluate protocol=paper": [("protocol.episodes", 10, "P"), ("protocol.seconds", 40, "P")],
     "evaluate protocol=endurance": [("protocol.seconds", 960, "P: nearly 16 min")],
 }
 
@@ -138,7 +135,7 @@ OWN: dict[str, list[Row]] = {
         ("env.randomization.factors.reflected_inertia", Uniform(0.8, 1.3), "estimate"),
         ("agent.learning_rate", 3e-4, "not published"),
         ("agent.tau", 0.005, "not published"),
-    ],
+    ]
 }
 
 

@@ -94,9 +94,7 @@ def test_what_two_surfaces_are_together_does_not_depend_on_which_is_named_first(
 
 
 @pytest.mark.parametrize(("tip_friction", "cube_friction"), [(0.9, 1.0), (0.4, 1.0), (0.9, 0.5)])
-def test_tips_hold_the_cube_up_to_friction_times_normal_force(
-    world: World, tip_friction: float, cube_friction: float
-) -> None:
+def test_tips_hold_the_cube_up_to_friction_times_normal_force(world, tip_friction, cube_friction) -> None:
     constants = EpisodeConstants(
         tip_friction=tip_friction, cube_friction=cube_friction, filter_time=0.1, gravity_onset=1000
     )

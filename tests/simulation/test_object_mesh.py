@@ -57,9 +57,7 @@ def tumbled(engine: EngineName, constants: EpisodeConstants, quaternion: np.ndar
     return orientation
 
 
-def test_a_bar_that_lies_askew_in_its_mesh_tumbles_as_the_bar_does_and_bullet_says_that_it_cannot(
-    tmp_path: Path,
-) -> None:
+def test_a_bar_that_lies_askew_in_its_mesh_tumbles_as_the_bar_does_and_bullet_says_that_it_cannot(tmp_path) -> None:
     size, askew = np.array([0.12, 0.04, 0.03]), Rotation.from_euler("z", 0.5)
     bar = constants_of(None, {"shape": "box", "size": size.tolist(), "mass": 0.05}, gravity_scale=0.0)
     file = str(write_obj(tmp_path, askew.apply(size * CUBE)))

@@ -29,9 +29,7 @@ def test_the_replay_comes_back_row_for_row_after_the_ring_went_round(tmp_path: P
 
 
 @pytest.mark.parametrize("damage", ["flip", "cut", "gone"])
-def test_damage_to_the_newest_is_said_and_the_one_before_is_used(
-    tmp_path: Path, reference: torch.Tensor, damage: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_damage_to_the_newest_is_said_and_the_one_before_is_used(tmp_path, reference, damage, capsys) -> None:
     finish(tiny_run(tmp_path))
     path = tmp_path / FILE
     content = bytearray(path.read_bytes())
@@ -81,9 +79,7 @@ def test_a_folder_in_the_place_of_a_checkpoint_is_damage(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("failing", ["write_whole", "sync_folder"])
-def test_a_full_disk_leaves_the_checkpoint_before_whole(
-    tmp_path: Path, reference: torch.Tensor, monkeypatch: pytest.MonkeyPatch, failing: str
-) -> None:
+def test_a_full_disk_leaves_the_checkpoint_before_whole(tmp_path, reference, monkeypatch, failing) -> None:
     finish(tiny_run(tmp_path, steps=80))
     run = tiny_run(tmp_path)
 

@@ -114,9 +114,7 @@ def test_an_actor_without_its_critics_waits_for_fresh_ones_and_so_does_the_tempe
         assert {torch.equal(a, b) for a, b in zip(after, given, strict=True)} == {still}
 
 
-def test_a_run_says_how_much_ctrl_c_costs_and_whose_networks_it_begins_with(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_run_says_how_much_ctrl_c_costs_and_whose_networks_it_begins_with(tmp_path, capsys) -> None:
     finish(tiny_run(tmp_path / "first", steps=80))
     policy = str(tmp_path / "first" / "policy.safetensors")
     capsys.readouterr()
@@ -127,9 +125,7 @@ def test_a_run_says_how_much_ctrl_c_costs_and_whose_networks_it_begins_with(
     assert second == f"networks of {policy}; critics begin anew, the actor waits for {FROZEN} updates"
 
 
-def test_a_run_does_the_steps_it_was_asked_for_and_says_how_many_that_were(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_run_does_the_steps_it_was_asked_for_and_says_how_many_that_were(tmp_path, capsys) -> None:
     run = tiny_run(tmp_path, steps=90)  # 20 an iteration, 80 from barrier to barrier
     run.announce()
     assert run.train() == "all 100 steps done"

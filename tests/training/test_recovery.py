@@ -76,9 +76,7 @@ def send(number: int, run: Run) -> None:
 
 @pytest.mark.parametrize("at", [1, 6])
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
-def test_a_killed_or_stopped_worker_is_replaced(
-    tmp_path: Path, reference: torch.Tensor, number: int, at: int, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_killed_or_stopped_worker_is_replaced(tmp_path, reference, number, at, capsys) -> None:
     run = disturbed(tmp_path, at, partial(send, number))
     assert torch.equal(weights(run), reference)
     assert "going back to the last barrier with new workers" in capsys.readouterr().out
@@ -144,9 +142,7 @@ def test_a_world_that_fails_once_is_replaced(tmp_path: Path, reference: torch.Te
     assert torch.equal(weights(run), reference)
 
 
-def test_a_fault_that_comes_again_ends_the_run_with_its_reason(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_fault_that_comes_again_ends_the_run_with_its_reason(tmp_path, capsys) -> None:
     environment = tiny_environment(fail_at=2)
     with pytest.raises(CollectionError, match=r"worker.*3 times in a row without a barrier in between"):
         train_on(lambda: tiny_run(tmp_path, collector=COLLECTOR, environment=environment))

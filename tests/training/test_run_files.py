@@ -58,9 +58,7 @@ def test_costs_add_up_over_sessions(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("in_process", "learning"), [(False, 2.0), (True, 1.5)])
-def test_what_is_simulated_in_the_learners_process_is_counted_once(
-    tmp_path: Path, in_process: bool, learning: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_simulated_in_the_learners_process_is_counted_once(tmp_path, in_process, learning, monkeypatch) -> None:
     (tmp_path / LEDGER).write_text("{")  # a damaged one counts for nothing
     clocks = SimpleNamespace(perf_counter=iter([100.0, 107.5]).__next__, process_time=iter([30.0, 32.0]).__next__)
     monkeypatch.setattr("tactile_cube.training.ledger.time", clocks)

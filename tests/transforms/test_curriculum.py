@@ -1,9 +1,7 @@
-from collections.abc import Callable
-
 import pytest
 from torchrl.envs import TransformedEnv
 
-from tactile_cube.env import Conditions, RotationEnv
+from tactile_cube.env import Conditions
 from tactile_cube.env.worlds import WorldsEnv
 from tactile_cube.errors import InputError
 from tactile_cube.transforms import Curriculum, Ramps
@@ -39,9 +37,7 @@ def test_impossible_ramps_are_refused(wrong: dict[str, float]) -> None:
         Ramps(**wrong)  # type: ignore[arg-type]
 
 
-def test_the_transform_acts_from_the_first_reset_on_and_at_those_that_follow(
-    rotation_task: Callable[..., RotationEnv],
-) -> None:
+def test_the_transform_acts_from_the_first_reset_on_and_at_those_that_follow(rotation_task) -> None:
     env = TransformedEnv(WorldsEnv([rotation_task()]), Curriculum(Ramps(low=100, high=200)))
     env.reset()
     task = env.base_env.tasks[0]

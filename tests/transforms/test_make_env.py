@@ -1,4 +1,3 @@
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -17,10 +16,7 @@ from tactile_cube.transforms import EnvConfig, Exploration, make_env
 from tactile_cube.transforms.make_env import rotation_env, transforms
 
 DISTURBED = Randomization(
-    start_angles=Uniform(-0.03, 0.03),
-    joint_offset=Uniform(-0.03, 0.03),
-    sensor_noise=0.002,
-    sticky_probability=0.1,
+    start_angles=Uniform(-0.03, 0.03), joint_offset=Uniform(-0.03, 0.03), sensor_noise=0.002, sticky_probability=0.1
 )
 
 
@@ -57,9 +53,7 @@ def reading(env: TransformedEnv, world: int) -> torch.Tensor:
     return torch.cat([torch.tensor(moment.joint_position), torch.tensor(moment.control_error)]).float()
 
 
-def test_observation_is_the_last_readings_oldest_first_and_a_reset_fills_it(
-    transformed: Callable[..., TransformedEnv],
-) -> None:
+def test_observation_is_the_last_readings_oldest_first_and_a_reset_fills_it(transformed) -> None:
     env = transformed(Compose(*transforms(EnvConfig(Task("full"), stack=3), explore=False)))
     data = env.reset()
     assert "joint_position" not in data

@@ -211,9 +211,7 @@ def test_the_diagnosis_page_names_the_effect_its_interval_and_its_rivals_and_dra
     assert "effects=[command_delay@a]" in text
 
 
-def test_a_diagnosis_with_an_object_shows_its_error_and_what_identify_takes(
-    comparison: Comparison, tmp_path: Path
-) -> None:
+def test_a_diagnosis_with_an_object_shows_its_error_and_what_identify_takes(comparison, tmp_path) -> None:
     slipping = DIAGNOSIS["effects"][0] | {"name": "lateral_friction", "joints": ["object"]}
     contact = {"error": {"nominal": 0.009, "refitted": 0.009, "with_effects": 0.003}, "error_joints": {}}
     both = DIAGNOSIS | {"effects": [*DIAGNOSIS["effects"], slipping], "contact": contact}
@@ -242,9 +240,7 @@ UNSAFE = replace(PLAYED, told=0.0, predictions={}, safety=replace(half_used(2), 
     ],
     ids=["decides", "decides at once", "no command decides", "nothing is safe"],
 )  # fmt: skip
-def test_an_ambiguous_diagnosis_names_the_next_experiment(
-    comparison: Comparison, tmp_path: Path, experiment: Experiment, said: list[str]
-) -> None:
+def test_an_ambiguous_diagnosis_names_the_next_experiment(comparison, tmp_path, experiment, said) -> None:
     text = diagnosed(DIAGNOSIS | {"verdict": "ambiguous"}, comparison, tmp_path, experiment=experiment)
     assert [one for one in ("What to record next", *said) if one not in text] == []
     assert ("To decide" in text) == (said[0].startswith("To decide"))

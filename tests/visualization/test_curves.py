@@ -31,9 +31,7 @@ def test_a_robustness_map_has_a_panel_for_each_axis(tmp_path: Path) -> None:
     variants = [Variant(), *(Variant(name=str(i), axis=f"axis {i % 4}", value=i) for i in range(8))]
     results = [judge_episode(episode(angle=3.0, steps=10))]
     write_robustness_map(
-        [VariantResult(v, results, summarise(results), None) for v in variants],
-        {"axis 1": 2.5},
-        tmp_path / "map.png",
+        [VariantResult(v, results, summarise(results), None) for v in variants], {"axis 1": 2.5}, tmp_path / "map.png"
     )
     with Image.open(tmp_path / "map.png") as picture:
         assert picture.height > 400

@@ -135,9 +135,7 @@ def logs(recording: Recording) -> list[tuple[str, str]]:
     return files
 
 
-def test_from_dropped_logs_to_the_error_at_the_noise(
-    window: Any, served: tuple[str, Path, psutil.Process], measured: Recording
-) -> None:
+def test_from_dropped_logs_to_the_error_at_the_noise(window, served, measured) -> None:
     drop(window, *logs(measured))
     window.get_by_text("still needed: the URDF of the rig, or a choice of one joint").wait_for()
     drop(window, ("rig.urdf", measured.urdf))
@@ -299,9 +297,7 @@ def test_a_wrong_file_is_named_with_what_to_do(window: Any, measured: Recording)
     window.get_by_text("/no/such/folder: no recording's folder").wait_for()
 
 
-def test_a_diagnosis_is_stopped_in_the_middle_and_another_one_answers(
-    window: Any, served: tuple[str, Path, psutil.Process], measured: Recording
-) -> None:
+def test_a_diagnosis_is_stopped_in_the_middle_and_another_one_answers(window, served, measured) -> None:
     open_recording(window, measured)
     window.get_by_role("button", name="Diagnose").click()
     window.get_by_text("best so far: ").wait_for()
@@ -376,9 +372,7 @@ def test_files_above_200_mb_are_refused_before_they_are_sent(window: Any, measur
     assert said == 2 * ["more than 200 MB: name the path of the files instead"]
 
 
-def test_two_windows_show_one_state_and_the_keyboard_is_enough(
-    window: Any, served: tuple[str, Path, psutil.Process], measured: Recording
-) -> None:
+def test_two_windows_show_one_state_and_the_keyboard_is_enough(window, served, measured) -> None:
     open_recording(window, measured)
     other = window.context.browser.new_page()
     other.goto(served[0])
@@ -402,9 +396,7 @@ def test_two_windows_show_one_state_and_the_keyboard_is_enough(
     other.close()
 
 
-def test_without_the_token_nothing_is_shown_and_with_it_no_script_reads_it(
-    browser: Any, served: tuple[str, Path, psutil.Process]
-) -> None:
+def test_without_the_token_nothing_is_shown_and_with_it_no_script_reads_it(browser, served) -> None:
     page = browser.new_page()
     token = served[0].partition("token=")[2]
     for address in (served[0].partition("enter")[0], served[0].partition("?")[0], served[0] + "x"):
@@ -451,9 +443,7 @@ OPENED = {
 }  # fmt: skip
 
 
-def test_hostile_files_are_refused_with_their_name_and_the_page_goes_on(
-    window: Any, served: tuple[str, Path, psutil.Process], measured: Recording, tmp_path: Path
-) -> None:
+def test_hostile_files_are_refused_with_their_name_and_the_page_goes_on(window, served, measured, tmp_path) -> None:
     drop(window, ("first.csv", "time,goal,position\n" + DIVIDED.format(*range(100))))
     window.get_by_text("To be imported: first.csv").wait_for()
     window.get_by_role("button", name="wheel", exact=True).click()
@@ -556,9 +546,7 @@ def test_hostile_names_are_text_in_every_widget(browser: Any, every_widget: str)
     page.close()
 
 
-def test_hostile_names_of_joints_and_trials_are_text_in_the_page(
-    window: Any, measured: Recording, tmp_path: Path
-) -> None:
+def test_hostile_names_of_joints_and_trials_are_text_in_the_page(window, measured, tmp_path) -> None:
     joint, text = f"$${HREF}$${NAME}", (measured.folder / "recording.yaml").read_text()
     described = yaml.safe_load(text) | {"joints": [joint]}
     for trial in described["trials"]:

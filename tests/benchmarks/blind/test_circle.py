@@ -45,9 +45,7 @@ def test_what_is_hidden_on_the_bench_is_what_the_hand_has(tmp_path: Path, name: 
     assert beside < 2e-3 < 4e-3 < without
 
 
-def test_steps_without_any_filter_are_followed_as_well_as_gentle_motion(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_steps_without_any_filter_are_followed_as_well_as_gentle_motion(tmp_path, monkeypatch) -> None:
     monkeypatch.setitem(excitation.COMMANDS, "sudden", lambda *args: excitation._stepped(*args[:4], 0.5, args[4]))
     world = circle.measured(circle.healthy())
     world.homing = 0.0

@@ -230,9 +230,7 @@ def test_the_judge(truth: dict[str, Any], answer: dict[str, Any], ratio: float, 
         (_answer("ambiguous", COGS), 1.5, False),
     ],
 )
-def test_an_answer_after_which_nobody_looks_further_is_confidently_wrong(
-    answer: dict[str, Any], ratio: float, confident: bool
-) -> None:
+def test_an_answer_after_which_nobody_looks_further_is_confidently_wrong(answer, ratio, confident) -> None:
     assert score(_truth(PLAY), answer, ratio).confident == confident
 
 

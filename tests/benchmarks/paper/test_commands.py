@@ -18,9 +18,7 @@ def typed(monkeypatch: pytest.MonkeyPatch, *words: str) -> None:
     monkeypatch.setattr(sys, "argv", ["command", *words])
 
 
-def test_the_page_in_the_docs_is_the_one_that_the_command_writes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_page_in_the_docs_is_the_one_that_the_command_writes(tmp_path, monkeypatch) -> None:
     page = tmp_path / "a" / "page.md"
     typed(monkeypatch, "--page", str(page))
     paper.main()

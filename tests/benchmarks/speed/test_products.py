@@ -14,9 +14,7 @@ def test_an_update_of_the_paper_takes_two_point_six_giga_operations() -> None:
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
-def test_every_product_is_computed_in_the_precision_asked_for(
-    dtype: torch.dtype, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_every_product_is_computed_in_the_precision_asked_for(dtype, monkeypatch) -> None:
     seen = []
     monkeypatch.setattr(torch, "mm", lambda left, right, out: seen.append((*left.shape, *right.shape, out.dtype)))
     multiplying([(3, 4, 5), (2, 3, 1)], dtype)()

@@ -95,9 +95,7 @@ class Mine(Effect):
         ("x[Stage.JOINT_TORQUE.value, j] - p[0] - 0.5", ", dt", "with neutral parameters; it must change nothing"),
     ],
 )
-def test_a_law_of_ones_own_that_cannot_be_used_is_refused_in_one_line(
-    law: str, dt: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_law_of_ones_own_that_cannot_be_used_is_refused_in_one_line(law, dt, said, tmp_path, monkeypatch) -> None:
     module = f"broken_{tmp_path.name}"
     (tmp_path / f"{module}.py").write_text(BROKEN.format(law=law, dt=dt))
     monkeypatch.chdir(tmp_path)

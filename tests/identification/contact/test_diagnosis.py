@@ -10,12 +10,7 @@ from tactile_cube.api.job import called_job
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile, Provenance
 from tactile_cube.errors import InputError
 from tactile_cube.identification.contact.grasps import compare_contact
-from tactile_cube.identification.contact.identification import (
-    ContactDiagnosis,
-    diagnosed,
-    stepped,
-    with_contact,
-)
+from tactile_cube.identification.contact.identification import ContactDiagnosis, diagnosed, stepped, with_contact
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.measurement.comparing.comparison import comparison_json
 from tactile_cube.measurement.recordings.reading import read_recording

@@ -1,7 +1,6 @@
 """Friction that was put into a simulated hand comes back from a recording of it, within the stated interval."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +10,7 @@ import yaml
 from tactile_cube.composition import CONFIG
 from tactile_cube.drivetrain.model_file import Estimate
 from tactile_cube.errors import InputError
-from tactile_cube.identification.contact.identification import (
-    ContactIdentification,
-    contact_effects,
-    identify_contact,
-)
+from tactile_cube.identification.contact.identification import ContactIdentification, contact_effects, identify_contact
 from tactile_cube.identification.model_files import stated_model
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
@@ -68,9 +63,7 @@ def test_the_recording_tells_of_the_load_and_not_of_the_friction(recording: Reco
     ("effect", "parameter", "truth", "factor"),
     [("lateral_friction", "coefficient", LATERAL, 1.2), ("spinning_friction", "radius", SPINNING, 1.45)],
 )
-def test_friction_comes_back_within_its_interval(
-    found: ContactIdentification, effect: str, parameter: str, truth: float, factor: float
-) -> None:
+def test_friction_comes_back_within_its_interval(found, effect, parameter, truth, factor) -> None:
     estimate = estimate_of(found, effect, parameter)
     assert estimate.low <= truth <= estimate.high
     assert truth / factor < estimate.value < truth * factor
@@ -155,8 +148,6 @@ def _flat(data: dict[str, Any]) -> None:
         (_flat, "recording.yaml: key 'object.size"),
     ],
 )
-def test_an_object_that_is_not_described_is_refused(
-    tmp_path: Path, change: Callable[[dict[str, Any]], None], message: str
-) -> None:
+def test_an_object_that_is_not_described_is_refused(tmp_path, change, message) -> None:
     with pytest.raises(InputError, match=message):
         read_recording(small_rig.write(tmp_path / "r", change))

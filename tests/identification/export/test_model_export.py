@@ -189,9 +189,7 @@ def test_bam_gets_its_own_names_and_the_motor_that_has_these_gains(tmp_path: Pat
         ("", r"is not here; give recording=FOLDER"),
     ],
 )
-def test_a_model_names_no_recording_outside_of_the_users_folder(
-    folder: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_model_names_no_recording_outside_of_the_users_folder(folder, said, tmp_path, monkeypatch) -> None:
     (tmp_path / "work").mkdir()
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "work")
@@ -213,18 +211,14 @@ def test_a_model_names_no_recording_outside_of_the_users_folder(
         ({"output": "."}, r"^output=\.: is a folder; name a file$"),
     ],
 )
-def test_a_wrong_setting_writes_no_file(
-    settings: dict[str, object], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_wrong_setting_writes_no_file(settings, said, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     with pytest.raises(InputError, match=said):
         tactile_cube.export_model(model(), "bam", values={"bam.actuator": "sts3215", **settings})
     assert not list(tmp_path.iterdir())
 
 
-def test_a_format_without_a_model_is_no_policys(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_format_without_a_model_is_no_policys(tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.setattr(sys, "argv", ["export", "format=mjcf", f"hydra.run.dir={tmp_path}"])
     with pytest.raises(SystemExit):
         main()

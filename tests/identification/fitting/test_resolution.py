@@ -18,9 +18,7 @@ EFFECTS = tuple(catalogue().values())  # one kernel is compiled for all tests
 
 
 @pytest.mark.parametrize(("left", "rate"), [(0.19, None), (0.3, 1000.0), (0.7, 2000.0), (0.9, 4000.0), (40.0, 4000.0)])
-def test_steps_are_as_short_as_the_error_that_they_leave_is_large(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, left: float, rate: float | None
-) -> None:
+def test_steps_are_as_short_as_the_error_that_they_leave_is_large(tmp_path, monkeypatch, left, rate) -> None:
     said: list[str] = []
     monkeypatch.setattr(resolution, "step_error", lambda *_: left)
     found = resolved(read_recording(write(tmp_path)), EFFECTS, said.append)
@@ -36,9 +34,7 @@ def test_steps_are_as_short_as_the_error_that_they_leave_is_large(
         ({500.0: 4.0, 1000.0: 2.0, 2000.0: 1.0}, 4000.0),  # no lower rate will do
     ],
 )
-def test_a_fast_controller_is_simulated_as_slowly_as_the_sensors_allow(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, left: dict[float, float], rate: float
-) -> None:
+def test_a_fast_controller_is_simulated_as_slowly_as_the_sensors_allow(tmp_path, monkeypatch, left, rate) -> None:
     said: list[str] = []
     stated = read_recording(write(tmp_path, lambda data: data["controller"].update(rate_hz=4000.0)))
 
@@ -65,9 +61,7 @@ def test_a_slow_controller_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert resolved(stated, EFFECTS, print) is stated
 
 
-def test_a_torque_limit_that_is_reached_between_rows_needs_shorter_steps_where_the_encoder_is_fine(
-    tmp_path: Path,
-) -> None:
+def test_a_torque_limit_that_is_reached_between_rows_needs_shorter_steps_where_the_encoder_is_fine(tmp_path) -> None:
     def error(limit: float, noise: float) -> float:
         def spoil(columns: dict[str, np.ndarray]) -> None:
             columns["a.command"] = 0.3 * np.sign(np.sin(2 * np.pi * 0.8 * columns["time"]))

@@ -47,9 +47,7 @@ def test_a_single_number_and_a_place_have_no_other_sign() -> None:
     [((0.96, 0.5), 1), ((0.90, 0.5), 0), ((0.96, 7.0), 0), ((0.96, -1.0), 0)],
     ids=["nearer its size", "clearly less", "further from it", "of the other sign"],
 )
-def test_of_starts_that_look_as_good_the_one_nearest_its_size_is_refitted(
-    second: tuple[float, float], taken: int
-) -> None:
+def test_of_starts_that_look_as_good_the_one_nearest_its_size_is_refitted(second, taken) -> None:
     scores = [replace(SCORE, gain=1.0, factor=6.0), replace(SCORE, gain=second[0], factor=second[1])]
     assert start(scores) is scores[taken]
 

@@ -47,9 +47,7 @@ def test_friction_of_constant_size_is_named_and_no_law_that_contains_it(search: 
 
 
 @pytest.mark.parametrize(("law", "name", "key"), PAIRS, ids=lambda one: one if isinstance(one, str) else one.name)
-def test_of_every_pair_the_simpler_law_is_tried_where_an_interval_reaches_it(
-    search: Search, law: Law, name: str, key: str
-) -> None:
+def test_of_every_pair_the_simpler_law_is_tried_where_an_interval_reaches_it(search, law, name, key) -> None:
     """A law at the value at which it becomes another one, and far from there in units of a narrow interval."""
     scales = search.shooting.sizes["a"]
     form = next(form for form in law.forms_at(scales) if key in form)

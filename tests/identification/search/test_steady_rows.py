@@ -15,8 +15,7 @@ def rows(rates: list[float]) -> int:
     time = np.arange(ROWS) / ROWS
     growth = np.exp(np.outer(rates, time)).reshape(1, -1)
     shooting = SimpleNamespace(
-        recording=SimpleNamespace(joints=("a",)),
-        start_sensitivity=lambda *_: np.stack([growth, growth])[..., None],
+        recording=SimpleNamespace(joints=("a",)), start_sensitivity=lambda *_: np.stack([growth, growth])[..., None]
     )
     windows = SimpleNamespace(weight=np.ones((1, ROWS * SEGMENTS, 1)), segment=ROWS)
     return steady_rows(shooting, None, windows)  # type: ignore[arg-type]

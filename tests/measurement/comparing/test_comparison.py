@@ -34,9 +34,7 @@ def test_the_band_holds_a_share_of_the_samples(comparison: Comparison) -> None:
 
 
 @pytest.mark.parametrize(("noise", "step", "used"), [(4e-4, None, 0.002), (1e-6, None, 0.00025), (1e-6, 0.002, 0.002)])
-def test_steps_are_shorter_where_the_sensors_would_show_their_error(
-    noise: float, step: float | None, used: float, tmp_path: Path
-) -> None:
+def test_steps_are_shorter_where_the_sensors_would_show_their_error(noise, step, used, tmp_path) -> None:
     fine_encoder = setting({"sensors.position_resolution": noise})
     recording = read_recording(write(tmp_path, fine_encoder, lambda columns: columns.update(table(noise=noise))))
     comparison, usual = compare_recording(recording, step=step), compare_recording(recording, step=USUAL_STEP)

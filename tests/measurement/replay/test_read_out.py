@@ -106,9 +106,7 @@ SMOOTH = {"smooth": 0.02, "softness": 0.003}
         (SMOOTH, 0.1, 0.2, 0.02),
     ],
 )
-def test_a_motor_follows_the_command_freely_as_far_as_its_gap_goes(
-    plant: Plant, values: dict, lead: float, jump: float, free: float
-) -> None:
+def test_a_motor_follows_the_command_freely_as_far_as_its_gap_goes(plant, values, lead, jump, free) -> None:
     """A torque of 0.003 N m leads by 0.0015 rad at 2 N m/rad, and by the softness' tanh(1) of half a smooth play."""
     memory, one = memory_of(plant, BACKLASH("q", play=0.0, **values)), np.ones(1)
     assert free_way(plant, memory, jump * one, lead * one, 2.0 * one) == pytest.approx(free, abs=1e-12)

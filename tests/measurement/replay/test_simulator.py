@@ -64,9 +64,7 @@ def delayed(seconds: float) -> Term:
 
 
 @pytest.mark.parametrize("terms", [(), (delayed(0.1),), (delayed(0.1), Term(RateLimit, "a", {"speed": 0.2}, ()))])
-def test_only_the_past_that_effects_remember_is_played_and_nothing_changes(
-    recording: Recording, monkeypatch: pytest.MonkeyPatch, terms: tuple[Term, ...]
-) -> None:
+def test_only_the_past_that_effects_remember_is_played_and_nothing_changes(recording, monkeypatch, terms) -> None:
     model = replace(nominal_model(recording), terms=terms)
     windows = cut(recording, np.full(2, 1e-4), segment=8)
     assert windows.history == 240

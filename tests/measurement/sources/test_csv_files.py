@@ -1,7 +1,6 @@
 """Logs as people have them: other names, units, separators and folders; what is understood, and what is asked."""
 
 import re
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -68,9 +67,7 @@ NUMBERED = {"a.command": "goal1", "a.position": "pos1", "b.command": "goal2", "b
           "b.position": "observation.state.b.pos"}, "timestamp", 1.0, DEGREE),
     ],
 )  # fmt: skip
-def test_names_and_units_of_other_programs_are_understood(
-    names: dict[str, str], time: str, tick: float, angle: float, tmp_path: Path
-) -> None:
+def test_names_and_units_of_other_programs_are_understood(names, time, tick, angle, tmp_path) -> None:
     recording = imported(tmp_path, {"log.csv": log(names, time, tick, angle)})
     assert recording.rate == pytest.approx(100.0)
     for k, joint in enumerate("ab"):
@@ -79,9 +76,7 @@ def test_names_and_units_of_other_programs_are_understood(
 
 
 @pytest.mark.parametrize(("unit", "size"), [("mNm", 1e-3), ("Nmm", 1e-3), ("Ncm", 1e-2), ("N cm", 1e-2), ("Nm", 1.0)])
-def test_torques_are_taken_where_all_joints_have_one_and_converted_by_their_names(
-    unit: str, size: float, tmp_path: Path
-) -> None:
+def test_torques_are_taken_where_all_joints_have_one_and_converted_by_their_names(unit, size, tmp_path) -> None:
     names = NUMBERED | {"a.torque": f"tau1 [{unit}]", "b.torque": f"tau2 [{unit}]"}
     trial = imported(tmp_path, {"log.csv": log(names)}).trials[0]
     assert trial.torque is not None
@@ -225,9 +220,7 @@ def change_goal(frame: Frame) -> Frame:
         ({}, lambda frame: {f"x{k}": v for k, v in enumerate(frame.values())}, "no joint of the URDF has both"),
     ],
 )
-def test_what_cannot_be_understood_is_asked_for(
-    changes: dict[str, object], spoil: Callable[[Frame], Frame], said: str, tmp_path: Path
-) -> None:
+def test_what_cannot_be_understood_is_asked_for(changes, spoil, said, tmp_path) -> None:
     with pytest.raises(InputError, match=said):
         imported(tmp_path, {"log.csv": spoil(log(NUMBERED))}, **changes)
 
@@ -240,9 +233,7 @@ def test_a_pattern_without_a_match_says_what_there_is(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "names", [("motor_angle_rad", "joint_angle_rad", "goal_rad"), ("motor_pos", "link_pos_deg", "motor_target")]
 )
-def test_a_geared_motor_is_counted_at_its_joint_by_the_sensor_on_the_link(
-    names: tuple[str, str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_geared_motor_is_counted_at_its_joint_by_the_sensor_on_the_link(names, tmp_path, capsys) -> None:
     motor, link, command = names
     gear, columns = -81.0, table(0)
     angle = DEGREE if link.endswith("deg") else 1.0
@@ -269,9 +260,7 @@ def test_a_geared_motor_is_counted_at_its_joint_by_the_sensor_on_the_link(
 @pytest.mark.parametrize(
     ("names", "changes"), [(("goal_ticks", "present_ticks"), {}), (("goal", "pos"), {"angle_unit": 4096})]
 )
-def test_ticks_of_an_encoder_are_angles_about_the_middle_of_its_turn(
-    names: tuple[str, str], changes: dict[str, object], tmp_path: Path
-) -> None:
+def test_ticks_of_an_encoder_are_angles_about_the_middle_of_its_turn(names, changes, tmp_path) -> None:
     columns = table(0)
     ticks = [np.round(columns[f"a.{one}"] / (2 * np.pi) * 4096) + 2048 for one in ("command", "position")]
     logged = {"time": columns["time"], **dict(zip(names, ticks, strict=True))}
@@ -303,9 +292,7 @@ def test_ticks_of_a_geared_motor_are_counted_at_its_joint_and_a_command_in_degre
 
 
 @pytest.mark.parametrize(("first", "middle", "zero"), [(2048, 300, 2048), (0, 300, 0), (40, 300, 0), (3000, 300, 2048)])
-def test_the_zero_of_ticks_is_where_the_joint_keeps_its_limits_and_else_the_nearer(
-    first: int, middle: int, zero: int
-) -> None:
+def test_the_zero_of_ticks_is_where_the_joint_keeps_its_limits_and_else_the_nearer(first, middle, zero) -> None:
     values = np.array([first - min(first, middle), first, first + middle], dtype=float)
     for limit in (2.0, np.inf) if first in (0, 2048) else (np.inf,):
         unit = position_unit(4096, "Present Position", values, RigJoint("a", -limit, limit, None))

@@ -117,10 +117,7 @@ def test_guesses_a_third_off_are_fitted_back_to_the_noise(tmp_path: Path) -> Non
         ({"robot": "wheel", "gravity": 9.81}, "source.gravity=9.81: expected a valid tuple"),
         ({"robot": "wheel", "gravity": [0.0, 0.0]}, r"source.gravity=\[0.0, 0.0\]: expected more values"),
         ({"robot": "wheel", "resolution": -1.0}, "source.resolution=-1.0: expected greater than or equal to 0"),
-        (
-            {"robot": "wheel", "controller": {"kt": 0.1}},
-            "controller.mode=position: kt and R are of mode=voltage",
-        ),
+        ({"robot": "wheel", "controller": {"kt": 0.1}}, "controller.mode=position: kt and R are of mode=voltage"),
         ({"robot": "wheel", "read": "behind"}, "source.read=behind: expected 'before' or 'after'"),
         ({"robot": "wheel", "controller": {"kp": "abc"}}, "source.controller.kp=abc: expected a valid number"),
         ({"robot": "wheel", "length": -1}, "source.length=-1: expected greater than 0"),

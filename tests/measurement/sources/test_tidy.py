@@ -30,9 +30,7 @@ def agrees(recording: Recording, rows: slice = slice(None), trial: int = 0) -> b
     return all(found[:, 0] == pytest.approx(made[key][rows], abs=1e-5) for found, key in pairs)
 
 
-def test_a_header_stands_below_a_preamble_and_above_its_units(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_header_stands_below_a_preamble_and_above_its_units(tmp_path, capsys) -> None:
     rows = written(one_joint(1e3, DEGREE)).replace("t,cmd,pos\n", "t,cmd,pos\nms,deg,deg\n")
     assert agrees(imported(tmp_path, {"log.csv": f"Scope 3\nOperator,NN\nRate, 100\n\n{rows}"}, ONE_JOINT))
     shown = " ".join(capsys.readouterr().out.split())
@@ -63,9 +61,7 @@ def test_times_of_day_are_seconds_across_midnight(date: bool, tmp_path: Path) ->
     assert agrees(imported(tmp_path, {"log.csv": polars.DataFrame(columns).write_csv()}, ONE_JOINT))
 
 
-def test_equal_rows_of_a_polled_log_are_left_out_and_counted(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_equal_rows_of_a_polled_log_are_left_out_and_counted(tmp_path, capsys) -> None:
     polled = {name: np.repeat(values, 6) for name, values in one_joint().items()}
     assert agrees(imported(tmp_path, {"log.csv": polled}, ONE_JOINT))
     assert "1500 of 1800 rows repeat the row before" in " ".join(capsys.readouterr().out.split())
@@ -121,9 +117,7 @@ def test_arrays_with_a_joint_axis_are_in_the_urdfs_order(tmp_path: Path) -> None
         assert agrees(recording)
 
 
-def test_a_matlab_file_is_unpacked_no_further_than_memory_holds(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_matlab_file_is_unpacked_no_further_than_memory_holds(tmp_path, monkeypatch) -> None:
     savemat(tmp_path / "log.mat", {"t": np.zeros(100_000)}, do_compression=True)
     monkeypatch.setattr(limits, "NUMBERS", 1000)
     with pytest.raises(InputError, match=r"log\.mat: unpacks to more than"):
