@@ -1,8 +1,6 @@
 """The catalogue in words: every effect says what it is, what it looks like in data and what it is confused with."""
 
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -10,6 +8,7 @@ import pytest
 import tactile_cube
 from tactile_cube.api.effects import EffectDescription, effects_table
 from tactile_cube.errors import InputError
+from tests.typed import typed
 
 EVERY = tactile_cube.effects()
 NAMES = {one.name for one in EVERY}
@@ -55,7 +54,6 @@ def test_a_misspelt_name_is_answered_with_the_nearest() -> None:
     ("words", "status", "shown"), [((), 0, "backlash: Play"), (("name=mass",), 2, "error: effect")]
 )
 def test_the_command_prints_or_says_what_is_wrong(words, status, shown, tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "tactile_cube.effects", *words]
-    run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False)
+    run = typed("effects", *words, folder=tmp_path)
     assert run.returncode == status
     assert shown in (run.stderr if status else run.stdout)

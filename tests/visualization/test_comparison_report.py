@@ -12,10 +12,11 @@ import pytest
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile
 from tactile_cube.identification.next_experiment import Experiment
 from tactile_cube.identification.search.residual_shape import Shape
-from tactile_cube.measurement.comparing.comparison import Comparison, compare_recording
+from tactile_cube.measurement.comparing.comparison import Comparison, compare_recording, describe_comparison
 from tactile_cube.measurement.comparing.error import ErrorSummary
 from tactile_cube.measurement.comparing.noise_floor import noise_floor
 from tactile_cube.measurement.recordings.reading import read_recording
+from tactile_cube.measurement.replay.simulator import Simulated
 from tactile_cube.measurement.units import of_joint
 from tactile_cube.visualization.charts import MEASURED, band, overlay
 from tactile_cube.visualization.comparison_episode import trial_starts, write_comparison
@@ -132,7 +133,9 @@ def test_a_sliding_joint_is_shown_in_millimetres_and_newtons(tmp_path: Path) -> 
     friction = EffectEstimate(
         effect="coulomb_friction@a", parameters={"friction": Estimate(value=0.1, low=0.05, high=0.2, unit="N m")}
     )
-    one = compare_recording(recording, ModelFile(joints=["a", "b"], values={"kd": kd}, effects=[friction]))
+    model = ModelFile(joints=["a", "b"], values={"kd": kd}, effects=[friction])
+    runs = [Simulated(trial.command, np.zeros_like(trial.command)) for trial in recording.trials]
+    one = describe_comparison(recording, model, runs, noise_floor(recording), None, 0.002)
     text = page(identification_report(one, DIAGNOSIS["error"], {}, "cmd", "m.yaml"), tmp_path / "i.html")
     assert "kd a0.20.1 .. 0.30.2N s/m" in text
     assert "kd b0.20.1 .. 0.30.2N m s/rad" in text

@@ -1,12 +1,11 @@
 """Recordings of one joint with a hidden effect, for tests that need a workbench."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import polars
 
-from tactile_cube.drivetrain.effects import JOINT_TORQUE, VELOCITY, Effect, Parameter, Stage, find_effect
+from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tests.identification.rigs_of_any_size import Size, simulated
@@ -27,17 +26,3 @@ def partly_known(folder: Path) -> Recording:
         shaken = trial.position[:, 0] + 9e-3 * np.sin(44.0 * trial.time + 9.0 * trial.position[0, 0])
         table.with_columns(polars.Series("a.position", shaken)).write_parquet(folder / trial.file)
     return read_recording(folder)
-
-
-OWN = "tests.workbench.small_bench.OwnDrag"
-
-
-class OwnDrag(Effect):
-    """A user's own effect."""
-
-    name, stage = "own_drag", Stage.JOINT_TORQUE
-    parameters = (Parameter("damping", "N m s/rad", 0.0, 0.0, 1.0, 0.01, "a test"),)
-
-    @staticmethod
-    def law(x: Any, j: Any, p: Any, s: Any, dt: Any) -> Any:
-        return x[JOINT_TORQUE, j] - p[0] * x[VELOCITY, j]

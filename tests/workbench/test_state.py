@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from tactile_cube.identification.identification import identify_effects
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.workbench.background import PHASES
 from tactile_cube.workbench.state import Look, Workbench
-from tests.workbench.small_bench import HIDDEN, OWN, STRIBECK
+from tests.workbench.small_bench import HIDDEN, STRIBECK
 
 
 @pytest.fixture(scope="module")
@@ -156,11 +157,16 @@ def test_a_saved_model_is_the_next_one_to_begin_with(explained: Workbench, measu
     assert again.stages[1].over_noise < 1.5
 
 
-def test_an_effect_of_ones_own_is_named_at_the_start_and_added_by_the_same_call(measured: Recording) -> None:
-    with pytest.raises(InputError, match=r"name it when the workbench starts, own_effects=\[tests.*OwnDrag\]"):
-        Workbench(measured).add(f"{OWN}@a")
-    bench = Workbench(measured, own_effects=[OWN])
-    assert bench.add(f"{OWN}@a").label == f"+ {OWN}@a"
+OWN = "my_rig.CableDrag"
+
+
+def test_an_effect_of_ones_own_is_named_at_the_start_and_added_by_the_same_call(bench, measured, monkeypatch) -> None:
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[2] / "examples"))
+    import_module("my_rig")
+    with pytest.raises(InputError, match=r"name it when the workbench starts, own_effects=\[my_rig\.CableDrag\]"):
+        bench.add(f"{OWN}@a")
+    own = Workbench(measured, own_effects=[OWN])
+    assert own.add(f"{OWN}@a").label == f"+ {OWN}@a"
 
 
 def test_a_first_look_gives_way_to_whoever_waits(bench: Workbench) -> None:

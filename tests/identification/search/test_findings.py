@@ -12,49 +12,55 @@ from tactile_cube.identification.search.findings import find
 from tactile_cube.identification.search.proposals import press
 from tactile_cube.identification.search.search import BestSoFar, Search
 from tactile_cube.identification.verdict import decide
+from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.split import held_out_split
 from tests.identification.rigs_of_any_size import NOISE, Size, simulated
 
 MOST_PATHS = 240  # exact simulations of a model in all windows of a problem; 30 of them look for twins
 
 
-def test_what_is_hidden_is_named_in_few_simulations(tmp_path: Path) -> None:
-    effects = tuple(find_effect(name) for name in ("payload", "torque_gain", "command_delay"))
-    recording = simulated(tmp_path, Size(slides=True), effects[0], {"mass": 0.1, "distance": 0.03})
-    search = Search(*held_out_split(recording), np.full(1, NOISE), effects, lambda line: None)
+EFFECTS = tuple(find_effect(name) for name in ("payload", "torque_gain", "command_delay"))
+
+
+@pytest.fixture(scope="module")
+def heavier(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    """An axis that carries 0.1 kg beside what is stated."""
+    return simulated(tmp_path_factory.mktemp("r"), Size(slides=True), EFFECTS[0], {"mass": 0.1, "distance": 0.03})
+
+
+def test_what_is_hidden_is_named_in_few_simulations(heavier: Recording) -> None:
+    search = Search(*held_out_split(heavier), np.full(1, NOISE), EFFECTS, lambda line: None)
     paths, noted = search.shooting.path, []
     search.shooting.path = lambda model, windows: (noted.append(1), paths(model, windows))[1]  # type: ignore[method-assign]
-    verdict = decide(find(search))
+    found = find(search)
+    verdict = decide(found)
     assert verdict.kind == "missing_effect"
-    assert named_by(verdict.chosen.effects) == {("payload", recording.joints[0])}
+    assert named_by(verdict.chosen.effects) == {("payload", heavier.joints[0])}
+    assert not found.stopped
     assert 0 < len(noted) < MOST_PATHS
 
 
 def test_a_mass_that_a_torque_constant_imitates_exactly_is_named_with_it(tmp_path: Path) -> None:
     """A tenth more mass at the link's own centre moves as a drive does that gives a tenth less of everything."""
-    effects = tuple(find_effect(name) for name in ("payload", "torque_gain", "command_delay"))
-    recording = simulated(tmp_path, Size(), effects[0], {"mass": 0.02, "distance": 0.1})
-    search = Search(*held_out_split(recording), np.full(1, NOISE), effects, lambda line: None)
+    recording = simulated(tmp_path, Size(), EFFECTS[0], {"mass": 0.02, "distance": 0.1})
+    search = Search(*held_out_split(recording), np.full(1, NOISE), EFFECTS, lambda line: None)
     verdict = decide(find(search))
     named = {name for one in (verdict.chosen, *verdict.rivals) for name, _ in named_by(one.effects)}
     assert verdict.kind == "ambiguous"
     assert named == {"payload", "torque_gain"}
 
 
-def test_a_search_that_may_simulate_little_ends_early_and_says_what_it_has_and_what_was_next(tmp_path: Path) -> None:
-    effects = tuple(find_effect(name) for name in ("payload", "torque_gain", "command_delay"))
-    recording = simulated(tmp_path, Size(slides=True), effects[0], {"mass": 0.1, "distance": 0.03})
+def test_a_search_that_may_simulate_little_ends_early_and_says_what_it_has_and_what_was_next(heavier) -> None:
     lines = list[str]()
     said = BestSoFar(lines.append)
     said.due = 0.0  # as if ten seconds had gone by
     criteria = Criteria(most_simulated=1.0)
-    findings = find(Search(*held_out_split(recording), np.full(1, NOISE), effects, said, criteria=criteria))
+    findings = find(Search(*held_out_split(heavier), np.full(1, NOISE), EFFECTS, said, criteria=criteria))
     assert findings.judged == ()
     assert findings.stopped == "every law by itself"
     said("anything")
     assert lines[-1].startswith("best answer so far: constants refitted (")
     assert lines[-1].endswith("; next: every law by itself")
-    assert not find(Search(*held_out_split(recording), np.full(1, NOISE), effects, lambda line: None)).stopped
 
 
 def test_a_law_is_never_made_much_larger_than_its_own_steps_made_it() -> None:

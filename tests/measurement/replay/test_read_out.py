@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from tactile_cube.drivetrain import DrivetrainConstants, Plant
-from tactile_cube.drivetrain.effects import find_effect
+from tactile_cube.drivetrain.effects import catalogue, find_effect
 from tactile_cube.measurement.replay.read_out import before_steps, free_way, jump_ratio, read_out
 from tests.drivetrain.rigs import wheel
 
@@ -52,7 +52,7 @@ BACKLASH = find_effect("backlash")
 
 @pytest.fixture(scope="module")
 def plant() -> Plant:
-    return Plant([wheel()], dt=0.002, effects=(DELAY, LAG, BACKLASH), joint_names=["q"])
+    return Plant([wheel()], dt=0.002, effects=tuple(catalogue().values()), joint_names=["q"])
 
 
 def memory_of(plant: Plant, *effects: object) -> np.ndarray:
