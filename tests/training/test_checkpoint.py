@@ -1,6 +1,7 @@
 """Checkpoints are whole or not there, cost what is new, and the one before serves when the newest is damaged."""
 
 import errno
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +14,20 @@ from tactile_cube.training.checkpoint import BEFORE, FILE, load_checkpoint
 from tests.training.tiny_run import finish, tiny_run
 
 
-def test_two_checkpoints_and_nothing_half_written_are_kept(tmp_path: Path) -> None:
-    finish(tiny_run(tmp_path))
-    names = {path.name for path in tmp_path.iterdir()}
+@pytest.fixture(scope="module")
+def made_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    finish(tiny_run(folder := tmp_path_factory.mktemp("ended")))
+    return folder
+
+
+@pytest.fixture
+def ended(made_once: Path, tmp_path: Path) -> Path:
+    """Folder of a run that came to its end."""
+    return shutil.copytree(made_once, tmp_path / "run")
+
+
+def test_two_checkpoints_and_nothing_half_written_are_kept(ended: Path) -> None:
+    names = {path.name for path in ended.iterdir()}
     assert {FILE, BEFORE} <= names
     assert not any("partial" in name or "next" in name for name in names)
 
@@ -29,9 +41,8 @@ def test_the_replay_comes_back_row_for_row_after_the_ring_went_round(tmp_path: P
 
 
 @pytest.mark.parametrize("damage", ["flip", "cut", "gone"])
-def test_damage_to_the_newest_is_said_and_the_one_before_is_used(tmp_path, reference, damage, capsys) -> None:
-    finish(tiny_run(tmp_path))
-    path = tmp_path / FILE
+def test_damage_to_the_newest_is_said_and_the_one_before_is_used(ended, reference, damage, capsys) -> None:
+    path = ended / FILE
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 1
     {
@@ -39,7 +50,7 @@ def test_damage_to_the_newest_is_said_and_the_one_before_is_used(tmp_path, refer
         "cut": lambda: path.write_bytes(content[: len(content) // 2]),
         "gone": path.unlink,
     }[damage]()
-    resumed = tiny_run(tmp_path)
+    resumed = tiny_run(ended)
     assert resumed.learner.steps == 80
     resumed.announce()
     said = capsys.readouterr().out
@@ -48,34 +59,31 @@ def test_damage_to_the_newest_is_said_and_the_one_before_is_used(tmp_path, refer
     assert torch.equal(finish(resumed), reference)
 
 
-def test_when_both_are_damaged_the_file_and_the_remedy_are_named(tmp_path: Path) -> None:
-    finish(tiny_run(tmp_path))
+def test_when_both_are_damaged_the_file_and_the_remedy_are_named(ended: Path) -> None:
     for name in (FILE, BEFORE):
-        (tmp_path / name).write_bytes(b"not a checkpoint")
+        (ended / name).write_bytes(b"not a checkpoint")
     with pytest.raises(InputError, match=r"checkpoint\.pt: damaged checkpoint .*training\.resume=never starts over"):
-        tiny_run(tmp_path)
-    assert tiny_run(tmp_path, resume="never").learner.steps == 0
+        tiny_run(ended)
+    assert tiny_run(ended, resume="never").learner.steps == 0
 
 
-def test_starting_over_leaves_nothing_of_the_run_before_and_a_refusal_all_of_it(tmp_path: Path) -> None:
-    finish(tiny_run(tmp_path))
-    (tmp_path / "policy_75.safetensors").write_text("old")
-    before = sorted(path.name for path in tmp_path.rglob("*"))
+def test_starting_over_leaves_nothing_of_the_run_before_and_a_refusal_all_of_it(ended: Path) -> None:
+    (ended / "policy_75.safetensors").write_text("old")
+    before = sorted(path.name for path in ended.rglob("*"))
     with pytest.raises(InputError):
-        tiny_run(tmp_path, resume="never", init_from=str(tmp_path / "none.safetensors"))
-    assert sorted(path.name for path in tmp_path.rglob("*")) == before
-    (tmp_path / "policy_averaged.safetensors").write_text("mine")
-    tiny_run(tmp_path, resume="never").close()
-    left = [path.name for path in tmp_path.iterdir() if path.name.startswith(("policy", "finished", "checkpoint"))]
+        tiny_run(ended, resume="never", init_from=str(ended / "none.safetensors"))
+    assert sorted(path.name for path in ended.rglob("*")) == before
+    (ended / "policy_averaged.safetensors").write_text("mine")
+    tiny_run(ended, resume="never").close()
+    left = [path.name for path in ended.iterdir() if path.name.startswith(("policy", "finished", "checkpoint"))]
     assert left == ["policy_averaged.safetensors"]
 
 
-def test_a_folder_in_the_place_of_a_checkpoint_is_damage(tmp_path: Path) -> None:
-    finish(tiny_run(tmp_path))
-    (tmp_path / FILE).unlink()
-    (tmp_path / FILE).mkdir()
+def test_a_folder_in_the_place_of_a_checkpoint_is_damage(ended: Path) -> None:
+    (ended / FILE).unlink()
+    (ended / FILE).mkdir()
     with pytest.raises(InputError, match=r"checkpoint\.pt: is a folder"):
-        tiny_run(tmp_path)
+        tiny_run(ended)
 
 
 @pytest.mark.parametrize("failing", ["write_whole", "sync_folder"])

@@ -13,8 +13,16 @@ from tactile_cube.agent.sac import Sac
 from tactile_cube.errors import InputError
 from tactile_cube.randomization import Learnability, Uniform
 from tactile_cube.training.build import FROZEN
+from tactile_cube.training.run import Run
 from tests.training.tiny_env import tiny_environment
 from tests.training.tiny_run import finish, tiny_run
+
+
+@pytest.fixture(scope="module")
+def first(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """A run of 80 steps, at its end, that others begin with."""
+    finish(run := tiny_run(tmp_path_factory.mktemp("first"), steps=80))
+    return run
 
 
 def test_same_seed_gives_the_same_weights_bit_for_bit(tmp_path: Path, reference: torch.Tensor) -> None:
@@ -90,19 +98,19 @@ def test_run_gives_up_without_regrasping_and_finishes_early_when_good(tmp_path: 
     assert good.train() == "mastered: above 0.0001 rad"
 
 
-def test_warm_start_takes_networks_from_checkpoint_and_policy(tmp_path: Path) -> None:
-    finish(tiny_run(tmp_path / "first", steps=80))
-    first = tiny_run(tmp_path / "first", steps=80).learner.agent.policy()
+def test_warm_start_takes_networks_from_checkpoint_and_policy(first: Run, tmp_path: Path) -> None:
+    given = first.learner.agent.policy()
     for file in ("checkpoint.pt", "policy.safetensors"):
-        run = tiny_run(tmp_path / f"next-{file}", init_from=str(tmp_path / "first" / file))
+        run = tiny_run(tmp_path / f"next-{file}", init_from=str(first.folder / file))
         assert run.learner.steps == 0
-        for mine, theirs in zip(run.learner.agent.policy().parameters(), first.parameters(), strict=True):
+        for mine, theirs in zip(run.learner.agent.policy().parameters(), given.parameters(), strict=True):
             assert torch.equal(mine, theirs)
+        with pytest.raises(InputError, match=r"networks of other shape"):
+            tiny_run(tmp_path / "other", agent_settings={"hidden": (8,)}, init_from=str(first.folder / file))
 
 
-def test_an_actor_without_its_critics_waits_for_fresh_ones_and_so_does_the_temperature(tmp_path: Path) -> None:
-    finish(tiny_run(tmp_path / "first", steps=80))
-    policy, checkpoint = (str(tmp_path / "first" / file) for file in ("policy.safetensors", "checkpoint.pt"))
+def test_an_actor_without_its_critics_waits_for_fresh_ones_and_so_does_the_temperature(first, tmp_path) -> None:
+    policy, checkpoint = (str(first.folder / file) for file in ("policy.safetensors", "checkpoint.pt"))
     new = tiny_run(tmp_path / "policy", init_from=policy)
     given = [*new.learner.agent.policy().parameters(), new.learner.agent.loss.log_alpha]
     assert new.learner.settings.actor_frozen == FROZEN
@@ -114,13 +122,12 @@ def test_an_actor_without_its_critics_waits_for_fresh_ones_and_so_does_the_tempe
         assert {torch.equal(a, b) for a, b in zip(after, given, strict=True)} == {still}
 
 
-def test_a_run_says_how_much_ctrl_c_costs_and_whose_networks_it_begins_with(tmp_path, capsys) -> None:
-    finish(tiny_run(tmp_path / "first", steps=80))
-    policy = str(tmp_path / "first" / "policy.safetensors")
+def test_a_run_says_how_much_ctrl_c_costs_and_whose_networks_it_begins_with(first, tmp_path, capsys) -> None:
+    policy = str(first.folder / "policy.safetensors")
     capsys.readouterr()
     tiny_run(tmp_path / "next", init_from=policy).announce()
-    first, saved, second = capsys.readouterr().out.splitlines()[:3]
-    assert first.endswith("starts, 160 steps in all")
+    starts, saved, second = capsys.readouterr().out.splitlines()[:3]
+    assert starts.endswith("starts, 160 steps in all")
     assert saved.startswith("saved every 80 steps; after Ctrl-C the same command goes on from the last time")
     assert second == f"networks of {policy}; critics begin anew, the actor waits for {FROZEN} updates"
 
@@ -135,27 +142,18 @@ def test_a_run_does_the_steps_it_was_asked_for_and_says_how_many_that_were(tmp_p
     assert tiny_run(tmp_path, steps=90).train() == "all 100 steps done"
 
 
-def test_warm_start_from_other_shape_is_refused(tmp_path: Path) -> None:
-    finish(tiny_run(tmp_path / "first", steps=80))
-    for file in ("checkpoint.pt", "policy.safetensors"):
-        with pytest.raises(InputError, match=r"networks of other shape"):
-            tiny_run(tmp_path / "next", agent_settings={"hidden": (8,)}, init_from=str(tmp_path / "first" / file))
-
-
-def test_a_run_can_begin_with_the_experience_of_another(tmp_path: Path) -> None:
-    first = tiny_run(tmp_path / "first", steps=80)
-    finish(first)
-    next_one = tiny_run(tmp_path / "next", init_from=str(tmp_path / "first" / "checkpoint.pt"), init_replay=True)
-    assert len(next_one.learner.replay) == len(first.learner.replay) > 0
-    assert (next_one.learner.replay.buffer[:] == first.learner.replay.buffer[:]).all()
+def test_a_run_can_begin_with_the_experience_of_another(first: Run, tmp_path: Path) -> None:
+    given = first.learner.replay
+    next_one = tiny_run(tmp_path / "next", init_from=str(first.folder / "checkpoint.pt"), init_replay=True)
+    assert len(next_one.learner.replay) == len(given) > 0
+    assert (next_one.learner.replay.buffer[:] == given.buffer[:]).all()
     assert next_one.learner.steps == 0
 
 
 @pytest.mark.parametrize("file", ["policy.safetensors", "nothing/checkpoint.pt"])
-def test_a_policy_file_has_no_experience(file: str, tmp_path: Path) -> None:
-    finish(tiny_run(tmp_path / "first", steps=80))
+def test_a_policy_file_has_no_experience(file: str, first: Run, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"nothing|training\.init_replay=true.*policy\.safetensors"):
-        tiny_run(tmp_path / "next", init_from=str(tmp_path / "first" / file), init_replay=True)
+        tiny_run(tmp_path / "next", init_from=str(first.folder / file), init_replay=True)
 
 
 def test_faulty_transitions_never_reach_the_replay(tmp_path: Path) -> None:
