@@ -1,8 +1,9 @@
-"""A world without physics, for tests of what surrounds the world."""
+"""Files that take long begin first; a world without physics, for tests of what surrounds the world."""
 
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable
 from typing import Any
 
@@ -13,6 +14,18 @@ from tactile_cube.env import Reward, RotationEnv, Task
 from tactile_cube.hand import DLR_HAND2
 from tactile_cube.randomization import Randomization, StartStates
 from tactile_cube.simulation import EpisodeConstants, SimulationOptions, Start
+
+LONG = ("test_browser", "test_train_command", "test_circle", "test_results_are_whole", "test_measurement_commands",
+        "test_recovery", "test_background", "test_readers", "test_judge", "test_state")  # fmt: skip
+"""By their stems; one of them at the end would keep one processor busy and leave the others idle."""
+
+
+def pytest_configure() -> None:
+    os.environ["OMP_NUM_THREADS"] = "1"  # of each process of the tests and what it starts: there is one a core already
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    items.sort(key=lambda item: LONG.index(item.path.stem) if item.path.stem in LONG else len(LONG))
 
 
 class ScriptedWorld:
