@@ -1,6 +1,7 @@
 """The field's standard model: what it recovers from noisy readings, what fixes its scale, and what it refuses."""
 
 from dataclasses import replace
+from math import copysign, sin
 from pathlib import Path
 
 import numpy as np
@@ -34,12 +35,12 @@ def swing(start: float, torque: Array) -> Array:
     """Position (rows,) [rad] of a pendulum let go at rest, whose drive gives less than it is asked for."""
     inertia, dt = INERTIA + MASS * LEVER**2, STEP / FINE
     position, speed, log = start, 0.0, np.zeros(len(torque))
-    for row, asked in enumerate(torque):
+    for row, asked in enumerate(torque.tolist()):
         log[row] = position
         for _ in range(FINE):
-            pulled = GAIN * asked - VISCOUS * speed - 9.81 * MASS * LEVER * np.sin(position)
+            pulled = GAIN * asked - VISCOUS * speed - 9.81 * MASS * LEVER * sin(position)
             free = speed + dt * pulled / inertia
-            speed = np.sign(free) * max(abs(free) - dt * DRY / inertia, 0.0)
+            speed = copysign(max(abs(free) - dt * DRY / inertia, 0.0), free)
             position += dt * speed
     return log
 
