@@ -180,7 +180,7 @@ def _time(rig: Recording, duration: float) -> Array:
 
 
 def _known_force(rig: Recording, number: int, rng: np.random.Generator) -> list[BenchTrial]:
-    """One configuration, approached from both sides under several weights that pull one way; a trial for each weight."""
+    """One configuration, approached from both sides under several weights that pull one way; one trial a weight."""
     configuration, direction = _configuration(rig, rng), rng.normal(size=3)
     direction /= np.linalg.norm(direction)
     tree = rig.rigid_body()  # the force acts as far beyond the last link's centre of mass as the joint is before it
