@@ -69,7 +69,7 @@ def _variant_section(title: str, protocol: str, results: Sequence[Results]) -> l
             as_good += 1
         else:
             lines.append(f"| {variant['variant']['name']} | {kept}, {regrasping} | {angle:.1f} |")
-    rest = f"{as_good} more conditions keep {100 * AS_GOOD:.0f} % of both counts and of the angle."
+    rest = f"{as_good} more conditions keep at least {100 * AS_GOOD:.0f} % of both counts and of the angle."
     return [f"## {title}", head, "\n".join(lines), rest]
 
 
