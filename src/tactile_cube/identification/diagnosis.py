@@ -281,17 +281,21 @@ def diagnose_recording(
 def no_worse(
     verdict: Verdict, standard: StandardModel, search: Search, simulations: Simulations, untouched: HeldOut
 ) -> Verdict:
-    """The verdict, with the standard model in the place of what follows untouched trials worse.
+    """The verdict, with the standard model in the place of what does not beat it on untouched trials.
 
-    A law that is the whole may differ in detail from the real thing, and is the better answer. Where the refitted
-    constants leave the noise alone nothing is recommended beside them, and none is needed.
+    A law that is the whole may differ in detail from the real thing, and is the better answer. Of two that leave
+    something the one with fewer numbers is recommended, unless the other earns the price of an effect. Where the
+    refitted constants leave the noise alone nothing is recommended beside them, and none is needed.
     """
     if verdict.kind == "adequate" or standard.fit is None:
         return verdict
-    alike = search.criteria.least_gain if verdict.kind in NOT_ALL else search.criteria.detail
+    alike = search.criteria.detail
+    if verdict.kind in NOT_ALL:
+        richer = verdict.chosen.size > sum(one.size for one in standard.effects)
+        alike = search.criteria.least_gain * (-1.0 if richer else 1.0)
     if not untouched.worse(simulations.final(verdict.chosen).model, standard.model, alike):
         return verdict
-    search.say("the standard model follows untouched trials better than what was found")
+    search.say("what was found does not beat the standard model on untouched trials")
     fitted = fit(search.problem, standard.model, search.unknowns(standard.model), iterations=0)
     judged = search.judged(standard.model)
     better = gain(search.base.judgement, judged)
