@@ -47,7 +47,7 @@ def budget(policy: str, world: str, episodes: int, seconds: float) -> dict[str, 
     """What a policy earns and pays in a world, the mean over its episodes.
 
     Returns:
-        "turned" [rad], "return", the weighed terms by name, "first" (their sum in the first second), and "path": plane
+        "turned" [rad], "return", the weighted terms by name, "first" (their sum in the first second), and "path": plane
         and tilt if each physics step's motion were paid instead of the net change over a policy step.
     """
     short = {"protocol.episodes": episodes, "protocol.seconds": seconds, "+env.simulation.trace": True}
@@ -106,13 +106,13 @@ def section() -> list[str]:
     path = [row["tilt_path"] / row["tilt"] for row in held]
     first = -min(row["first"] for row in held)
     words = (
-        "Three episodes of 10 s under the published weights (`python -m benchmarks.paper.budget`). Over two engines, "
-        "time steps, compliances, frictions, weights and both signs of K_e, where no cube is lost, a "
-        f"radian pays {min(tilt):.0f} to {max(tilt):.0f} for tilting alone and earns at most 16. The first "
-        f"second pays at most {first:.0f}. If the path of every 2 ms were paid and not the net change of a step, "
-        f"tilting would cost {min(path):.2f} to {max(path):.2f} times as much: it is the gait, not noise of the "
-        "contact. With a filter of 0.08 s, the other reading of its cut-off, every gait loses cubes. None of these "
-        "policies was trained under these weights."
+        "Three episodes of 10 s under the published weights (`python -m benchmarks.paper.budget`). No policy was "
+        f"trained under them. A radian earns at most 16, and tilting alone costs {min(tilt):.0f} to {max(tilt):.0f}, "
+        "in all worlds in which no cube is lost (two engines; other time steps, compliances, frictions, weights and "
+        f"signs of K_e). The first second costs at most {first:.0f}. The gait is the cause, not noise of the contact: "
+        f"charged for every 2 ms instead of a step's net change, tilting would cost {min(path):.2f} to "
+        f"{max(path):.2f} times as much. With a filter of 0.08 s, the other reading of its cut-off, every gait loses "
+        "cubes."
     )
     return ["## What a gait earns and pays", words, table([row for row in rows if row["world"] in tuple(WORLDS)[:2]])]
 

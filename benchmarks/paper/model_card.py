@@ -36,7 +36,7 @@ def model_card(name: str, info: PolicyInfo, runs: Sequence[Ancestor], results: S
         **({"weights": f"mean of those after {', '.join(map(str, info.averaged))} steps"} if info.averaged else {}),
         "seed": info.seed,
         "commit": info.commit,
-        "teacher": "; ".join(f"{run.teacher} ({run.name})" for run in trained if run.teacher != NONE) or NONE,
+        "demonstrations": "; ".join(f"{run.shown} ({run.name})" for run in trained if run.shown != NONE) or NONE,
         "CPU hours": total(runs),
         "network": f"{info.observation_size} -> {' -> '.join(map(str, info.hidden))} -> {info.action_size}",
     }
@@ -84,7 +84,7 @@ def _successes(result: Results) -> int:
 
 
 POLICY, LEDGER = "policy.safetensors", "ledger.json"
-SETTINGS = ("begins with", "teacher", "reward", "discount", "starts", "spinning friction")
+SETTINGS = ("begins with", "demonstrations", "reward", "discount", "starts", "spinning friction")
 HEAD = ("run", "steps", "CPU hours", "on the clock [h]", *SETTINGS, "commit")
 UNKNOWN, NONE = "not recorded", "none"
 SEARCH = "search_gait"
@@ -111,13 +111,13 @@ class Ancestor:
     commit: str = UNKNOWN
 
     @property
-    def teacher(self) -> str:
-        """Who showed what to do, and whether it was imitated."""
-        return self.settings.get("teacher", NONE)
+    def shown(self) -> str:
+        """Demonstrations that the run had, and whether it imitated them."""
+        return self.settings.get("demonstrations", NONE)
 
 
 def read_ancestry(folders: Sequence[Path]) -> list[Ancestor]:
-    """Read runs, and before each one what it rests on: where it began, who taught it, the search for its gait.
+    """Read runs, and before each one what it rests on: where it began, the search for its gait.
 
     Args:
         folders: of the runs, the first one first, the policy's own the last. A run that began with that of a folder
@@ -137,9 +137,7 @@ def _with_ancestors(folder: Path, given: set[str]) -> list[Ancestor]:
     info = load_actor(folder / POLICY)[1]
     with making(str(folder / POLICY)):
         exploration, start = info.config.get("exploration") or {}, (info.config.get("training") or {}).get("init_from")
-        teacher = exploration.get("teacher") if exploration.get("demonstrations") else None
-        known = given | {folder.name}
-        before = [one for named in (start, teacher) if named for one in _named(Path(named), folder.parent, known)]
+        before = _named(Path(start), folder.parent, given | {folder.name}) if start else []
         before += _search(exploration)
         return [*before, Ancestor(folder.name, steps, cpu_hours, wall_hours, in_words(info.config), info.commit)]
 
@@ -158,8 +156,8 @@ def _named(path: Path, beside: Path, given: set[str]) -> list[Ancestor]:
 
 
 def _search(exploration: Mapping[str, Any]) -> list[Ancestor]:
-    """The search behind the scripted gait that taught a run, if one did; its cost is unknown unless the gaits tell."""
-    if not exploration.get("demonstrations") or exploration.get("teacher"):
+    """The search for the scripted gait of the demonstrations; its cost is unknown unless the gaits state it."""
+    if not exploration.get("demonstrations"):
         return []
     return [Ancestor(**{"name": SEARCH, **((exploration.get("gaits") or {}).get("search") or {})})]
 
@@ -192,7 +190,7 @@ def in_words(config: Mapping[str, Any]) -> dict[str, str]:
     friction = (env.get("constants") or {}).get("tip_spinning_friction")
     return {
         "begins with": str(training.get("init_from") or "fresh networks"),
-        "teacher": _teacher(config.get("exploration") or {}, agent),
+        "demonstrations": _demonstrations(config.get("exploration") or {}, agent),
         "reward": ", ".join(weights),
         "discount": f"{agent.get('gamma', '?')}, {agent.get('n_step', 1)}-step returns",
         "starts": _starts(start),
@@ -206,13 +204,11 @@ def _starts(start: Mapping[str, Any]) -> str:
     return f"turned by up to {start.get('yaw_range', 0):g} rad"
 
 
-def _teacher(exploration: Mapping[str, Any], agent: Mapping[str, Any]) -> str:
+def _demonstrations(exploration: Mapping[str, Any], agent: Mapping[str, Any]) -> str:
     share, weight = exploration.get("demonstrations", 0), agent.get("demonstration_weight", 0)
     if not share:
         return NONE
-    named = exploration.get("teacher")
-    who = f"the policy {Path(named).stem}" if named else "a scripted gait"
-    return f"{who} in {100 * share:.0f} % of the episodes, imitated with weight {weight:g}"
+    return f"a scripted gait in {100 * share:.0f} % of the episodes, imitated with weight {weight:g}"
 
 
 def ancestry_table(runs: Sequence[Ancestor]) -> list[str]:

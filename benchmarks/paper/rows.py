@@ -202,16 +202,16 @@ def _verdicts(name: str) -> Callable[[Results], str]:
 
 
 def _training_cost(results: Results) -> str:
-    """Hours and teacher of the policy's card, where it comes with the package."""
+    """Hours and demonstrations of the policy's card, where it comes with the package."""
     file = SHIPPED / f"{results['policy']['label']}.md"
     if not file.is_file():
         return "see the ledger of its run"
     card = read_card(file)
-    return f"{card['CPU hours']}; teacher: {card['teacher']}"
+    return f"{card['CPU hours']}; demonstrations: {card['demonstrations']}"
 
 
 ROWS = (
-    Row("CPU hours of training", "600, without a teacher", "paper", _training_cost, made_by=TRAIN),
+    Row("CPU hours of training", "600, without demonstrations", "paper", _training_cost, made_by=TRAIN),
     Row("10 runs of 40 s, at least 80 % of the best run", "robot 8/10, simulation 9/10", "paper", _outcome),
     Row("best of these runs", "15 rad", "paper", _best),
     Row("the same, 100 runs", "-", "many", _outcome),

@@ -135,7 +135,7 @@ def train(job: Job) -> float:
     What a run writes into its folder: metrics.csv, tensorboard/, policy.safetensors (latest) and
     policy_best.safetensors, trial.gif, checkpoint.pt and checkpoint_before.pt (to go on from), train.log (what the
     console showed), ledger.json (CPU-hours), finished.json (how it ended) and .hydra/ (configuration). A training in
-    stages has such a folder for each of them in its own, and bullet/ and mujoco/ with the judgement.
+    stages has a folder like it for each stage in its own, and bullet/ and mujoco/ with the judgement.
 
     Returns:
         Mean angle of the last training episodes [rad], a sweep's objective.

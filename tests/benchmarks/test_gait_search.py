@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import yaml
 
-from benchmarks.teacher.gait_search import BOUNDS, search_gait, try_gait, write_gait
+from benchmarks.gait.gait_search import BOUNDS, search_gait, try_gait, write_gait
 from tactile_cube.env import RotationEnv, Task, TimeStep
 from tactile_cube.env.task import DROPPED, RUNNING, TIME_LIMIT
 from tactile_cube.hand import DLR_HAND2, Gait

@@ -9,7 +9,10 @@ import pytest
 from tactile_cube.drivetrain.effects import catalogue, find_effect
 from tactile_cube.drivetrain.effects.effect import FINGER
 from tactile_cube.identification.diagnosis import Unseen, no_worse, unseen
+from tactile_cube.identification.fitting.gauss_newton import fit
 from tactile_cube.identification.in_words import unseen_effects
+from tactile_cube.identification.search.candidates import Candidate
+from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.search.search import Search
 from tactile_cube.identification.standard_model import fit_standard_model
 from tactile_cube.identification.verdict import Simulations, Verdict
@@ -77,3 +80,27 @@ def test_nothing_that_claims_to_be_all_is_recommended_where_the_standard_model_f
     assert verdict.kind == "unknown_effect"
     assert verdict.chosen.fit.model == standard.model
     assert no_worse(nothing, standard, search, simulations, search.free_runs) == nothing
+
+
+def test_where_both_leave_something_the_standard_model_stands_unless_a_richer_one_beats_it(
+    tmp_path: Path,
+) -> None:
+    hidden = find_effect("cogging")
+    recording = simulated(tmp_path, Size(), hidden, {"sine": 0.05, "cosine": 0.0, "harmonic": 7.0})
+    noise, parts = np.full(1, NOISE), held_out_split(recording)
+    more = Candidate(find_effect("torque_bias"), tuple(recording.joints), {"bias": 0.0})
+    search = Search(*parts, noise, (hidden, more.effect), lambda line: None)
+    standard = fit_standard_model(*parts, noise, effects=(hidden, more.effect))
+    simulations = Simulations(search, search.base, noise_floor(recording))
+    model, _ = more.added_to(standard.model)
+    chosen = Explanation(
+        (*standard.effects, more),
+        fit(search.problem, model, search.unknowns(model), iterations=0),
+        search.judged(model),
+        0.0,
+        0.5,
+    )
+    verdict = no_worse(Verdict("partly_explained", chosen), standard, search, simulations, search.free_runs)
+    assert (verdict.kind, verdict.chosen.effects) == ("unknown_effect", standard.effects)
+    whole = Verdict("missing_effect", chosen)
+    assert no_worse(whole, standard, search, simulations, search.free_runs) == whole

@@ -24,7 +24,7 @@ def test_block_larger_than_the_ring_leaves_its_end() -> None:
     assert sorted(replay.buffer[:]["observation"][:, 0].tolist()) == [3.0, 4.0, 5.0]
 
 
-def test_rewards_are_weighed_when_sampled() -> None:
+def test_rewards_are_weighted_when_sampled() -> None:
     replay = Replay(10, SIZES, 2, seed=0)
     transitions = rows(replay, [1.0, 1.0])
     transitions["next", "reward_terms"] = torch.tensor([[2.0, 5.0], [2.0, 5.0]])

@@ -64,7 +64,7 @@ def test_what_was_taken_reaches_the_world(transformed: MakeEnv) -> None:
     assert task.world.commands[-1] == pytest.approx(wanted)
 
 
-def test_a_gait_acts_in_demonstrations_and_the_policy_takes_over_for_stretches(transformed: MakeEnv) -> None:
+def test_a_gait_acts_in_demonstrations_and_the_policy_takes_over_for_some_steps(transformed: MakeEnv) -> None:
     gaits = (torch.arange(2.0)[:, None] / 2.0 + torch.arange(1.0, 31.0) / 100.0)[..., None].expand(2, 30, 12)
     explore = Exploration(episodes=0.0, probability=0.1, demonstrations=0.5, noise=0.0)
     env = transformed(FingerExploration(explore, gaits), worlds=100)

@@ -26,7 +26,7 @@ from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import require_same_joints
 from tactile_cube.whole_file import write_json, write_whole, written_together
 
-SHAPES = 3  # of the missing torque of one joint, most telling first
+SHAPES = 3  # of the missing torque of one joint, best fit first
 
 
 @dataclass(frozen=True)

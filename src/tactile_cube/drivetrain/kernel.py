@@ -74,7 +74,7 @@ def plan_memory(topology: Topology, effects: Sequence[type[Effect]], dt: float, 
     C, N, n, joints = topology.chains, len(topology.parent), len(topology.leader), topology.joints
     keys: list[tuple[Shape, str]] = [
         ((1,), "dt step seen trace_rows trace_offset reading unsure follows"),
-        ((1,), "time_constant tendon_stiffness tendon_damping contact_torque_limit weighed"),
+        ((1,), "time_constant tendon_stiffness tendon_damping contact_torque_limit needs_weight"),
         # of each joint: constants, then its state
         ((joints,), "kp kd compliance static_friction reflected_inertia torque_limit command_torque_limit rate_limit"),
         ((joints,), "brake friction_creep external_torque angle_offset goal"),

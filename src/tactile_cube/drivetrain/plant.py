@@ -253,7 +253,7 @@ class Plant:
         self.view(memory, f"parameters:{effect.name}")[..., a, :] = block
         self.view(memory, f"active:{effect.name}")[..., a] = 1.0
         if effect.weighs:
-            self.view(memory, "weighed")[...] = 1.0
+            self.view(memory, "needs_weight")[...] = 1.0
 
     def place(self, joint: str) -> Place:
         """Where a joint sits in the plant."""

@@ -141,7 +141,7 @@ def find_policy(name: str | None) -> PolicySource:
 
     Args:
         name: a policy file, a folder of a training run, the name of a policy that ships with the package, "hold",
-            "random", "scripted", "scripted:FILE" (the best gait that `benchmarks.teacher` found), "replay:FILE" (an
+            "random", "scripted", "scripted:FILE" (the best gait that `benchmarks.gait` found), "replay:FILE" (an
             episode that evaluate wrote, `*.npz`), or None for the shipped default.
 
     Raises:
@@ -155,7 +155,7 @@ def find_policy(name: str | None) -> PolicySource:
             best = read_yaml(Path(place))["best"]
             gait = Gait(**best | {"phases": tuple(best["phases"])})
         except (KeyError, TypeError) as error:
-            raise InputError(f"policy=scripted:{place}: no gait of benchmarks.teacher (key 'best')") from error
+            raise InputError(f"policy=scripted:{place}: no gait of benchmarks.gait (key 'best')") from error
         return PolicySource(ScriptedPolicy(gait), f"scripted gait of {Path(place).name}")
     if separator and kind == "replay":
         record = EpisodeRecord.load(Path(place))

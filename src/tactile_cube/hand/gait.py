@@ -34,7 +34,7 @@ class Gait:
     """Shape of the walk.
 
     The defaults were found by cross-entropy searches at full weight, T_s 0.25 and 0.5 s, and the published 0.1 m of
-    spinning friction; `python -m benchmarks.teacher` searches again. About -z is what this hand pose turns best.
+    spinning friction; `python -m benchmarks.gait` searches again. About -z is what this hand pose turns best.
 
     Attributes:
         swing: a finger walks from +swing to -swing about its place, and back in the air, to turn the cube in -z [rad].

@@ -33,8 +33,8 @@ from tactile_cube.measurement.replay.windows import steps_per_row
 from tactile_cube.measurement.split import held_out_split, with_test_part
 from tactile_cube.measurement.units import common_unit
 
-MOST_STRETCHES = 12
-"""That follow no model; with so many found, no more are looked for: each time all is searched anew."""
+MOST_INTERVALS = 12
+"""Maximum number of disturbed intervals; each search for more of them repeats the whole diagnosis."""
 NOT_ALL = ("unknown_effect", "partly_explained")
 """Verdicts that say that more is missing than is named."""
 LESS = (*NOT_ALL, "ambiguous")
@@ -110,14 +110,14 @@ class Inquired(NamedTuple):
 
 
 def beside_disturbances(inquiry: Inquiry) -> Inquired:
-    """A recording asked without the stretches that follow no model, as when somebody pushes the arm.
+    """Repeat the diagnosis without the intervals that follow no model, as when somebody pushes the arm.
 
-    A stretch is left out where other runs of its command show nothing of it at that time; most stand out beside the
-    model with refitted constants already. What was played once may as well be a law that shows nowhere else; it is
-    left out where only so all that is missing can be named.
+    An interval is left out where other runs of its command do not fail at that time. Most show already beside the
+    model with refitted constants. A failure of a command that ran only once may also be a law that acts nowhere else.
+    It is left out only if the answer then names everything that is missing.
     """
     left_out: tuple[Disturbance, ...] = ()
-    while len(left_out) < MOST_STRETCHES:
+    while len(left_out) < MOST_INTERVALS:
         recording = inquiry.recording
         found = [one for one in disturbances(inquiry.search, recording, inquiry.search.base.fit.model) if one.repeats]
         if not found:
@@ -281,17 +281,21 @@ def diagnose_recording(
 def no_worse(
     verdict: Verdict, standard: StandardModel, search: Search, simulations: Simulations, untouched: HeldOut
 ) -> Verdict:
-    """The verdict, with the standard model in the place of what follows untouched trials worse.
+    """The verdict, with the standard model in the place of what does not beat it on untouched trials.
 
-    A law that is the whole may differ in detail from the real thing, and is the better answer. Where the refitted
-    constants leave the noise alone nothing is recommended beside them, and none is needed.
+    A law that is the whole may differ in detail from the real thing, and is the better answer. Of two that leave
+    something the one with fewer numbers is recommended, unless the other earns the price of an effect. Where the
+    refitted constants leave the noise alone nothing is recommended beside them, and none is needed.
     """
     if verdict.kind == "adequate" or standard.fit is None:
         return verdict
-    alike = search.criteria.least_gain if verdict.kind in NOT_ALL else search.criteria.detail
+    alike = search.criteria.detail
+    if verdict.kind in NOT_ALL:
+        richer = verdict.chosen.size > sum(one.size for one in standard.effects)
+        alike = search.criteria.least_gain * (-1.0 if richer else 1.0)
     if not untouched.worse(simulations.final(verdict.chosen).model, standard.model, alike):
         return verdict
-    search.say("the standard model follows untouched trials better than what was found")
+    search.say("what was found does not beat the standard model on untouched trials")
     fitted = fit(search.problem, standard.model, search.unknowns(standard.model), iterations=0)
     judged = search.judged(standard.model)
     better = gain(search.base.judgement, judged)

@@ -22,10 +22,8 @@ from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model, nominal_model
 
 Array = NDArray[np.float64]
-STANDS_OUT = (
-    5.0  # times the error of a joint elsewhere: less hardly moves a fit, and where a joint sticks chance does it
-)
-USUAL = 0.9  # of a joint's segments are no worse than usual: what disturbs more of a recording belongs to the machine
+STANDS_OUT = 5.0  # times a joint's usual error: less hardly moves a fit, and a joint that sticks does it by chance
+USUAL = 0.9  # share of a joint's segments with the usual error: what disturbs more belongs to the machine
 
 
 @dataclass(frozen=True)
@@ -70,7 +68,7 @@ def disturbances(search: Search, recording: Recording, model: Model) -> list[Dis
         failing = np.flatnonzero((own > STANDS_OUT * usual).any(axis=1))
         others = [(by_trial[k], lag) for k, lag in repeats_of(recording.trials, index)] if len(failing) else []
         failing = np.array([k for k in failing if not _shared(own, int(k), others, rows)], dtype=int)
-        for first, last in _stretches(failing):
+        for first, last in _intervals(failing):
             mean = np.sqrt(np.nanmean(own[first : last + 1] ** 2, axis=0))
             joint = int(np.nanargmax(mean / usual))
             start = max((first - 1) * rows * trial.step, 0.0)
@@ -118,15 +116,15 @@ def _shared(own: Array, place: int, others: Sequence[tuple[Array, int]], rows: i
     return False
 
 
-def _stretches(failing: NDArray[np.int64]) -> list[tuple[int, int]]:
-    """First and last segments of runs of failing ones; what lies between two close ones belongs to them."""
+def _intervals(failing: NDArray[np.int64]) -> list[tuple[int, int]]:
+    """First and last segments of the failing intervals; one segment between two failing ones belongs to them."""
     if not len(failing):
         return []
     edges = np.flatnonzero(np.diff(failing) > 2)
     return [(int(part[0]), int(part[-1])) for part in np.split(failing, edges + 1)]
 
 
-SEGMENTS = 32  # that tell them apart
+SEGMENTS = 32  # enough to tell late commands from laws
 NEARER = -0.5  # rows: a reading that is as early comes nearer to its stamp with commands a row earlier
 
 

@@ -47,7 +47,7 @@ class JointDrive:
     delay: float = _said(0.0, "s")  # of commands
     rate: float = _said(inf, "rad/s")  # fastest change of the command that the drive follows
     stall: float = _said(inf, "N m")  # largest torque at rest of a motor whose supply is limited
-    no_load: float = _said(inf, "rad/s")  # speed at which such a motor has no torque left
+    no_load: float = _said(inf, "rad/s")  # speed at which that motor has no torque left
     excess: float = _said(0.0, "N m more friction at rest (stribeck_friction)")  # falls by exp(-|v/velocity|^exponent)
     stiffness: float = _said(inf, "N m/rad")  # of the gear between motor and link
     velocity: float = 0.0  # [rad/s]

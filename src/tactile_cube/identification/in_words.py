@@ -176,7 +176,7 @@ def common_offset(entry: Mapping[str, Any], units: Mapping[str, str]) -> str:
 
 
 def disturbed(result: Mapping[str, Any]) -> list[str]:
-    """The stretches that follow no model, left out or suspected, and what to do about them."""
+    """The intervals that follow no model, left out or suspected, and what to do about them."""
     lines = []
     for key, opening in (("left_out", "Left out"), ("suspected", "Not left out")):
         for one in result.get(key, []):

@@ -1,7 +1,7 @@
-"""The commands that would tell rival explanations apart: simulated under every rival, the most telling written down.
+"""Commands that separate rival explanations: simulated under every rival, the best ones written down.
 
-Telling is what a rival still gets wrong after it was refitted to what the other one predicts (Atkinson and Fedorov, The
-design of experiments for discriminating between two rival models, Biometrika 62, 1975).
+The best commands leave a rival the largest error after it was refitted to what the other one predicts (Atkinson and
+Fedorov, The design of experiments for discriminating between two rival models, Biometrika 62, 1975).
 """
 
 from collections.abc import Mapping

@@ -169,8 +169,8 @@ def middle_command(recording: Recording) -> Array:
         everything = np.concatenate([trial.command for trial in recording.trials])
         return np.asarray(0.5 * (everything.min(axis=0) + everything.max(axis=0)))
     tree = recording.rigid_body()
-    posture, still = tree.expand(recording.trials[-1].position[0]), np.zeros(tree.dofs)
-    return np.asarray(tree.coupling.T @ tree.equations(posture, still, recording.gravity)[1])
+    configuration, still = tree.expand(recording.trials[-1].position[0]), np.zeros(tree.dofs)
+    return np.asarray(tree.coupling.T @ tree.equations(configuration, still, recording.gravity)[1])
 
 
 def _waves(time: Array, recording: Recording, rng: np.random.Generator) -> dict[str, Array]:

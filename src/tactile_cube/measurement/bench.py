@@ -50,12 +50,12 @@ def ramps(time: Array, rng: np.random.Generator) -> Array:
 
 
 def holds(time: Array, rng: np.random.Generator) -> Array:
-    """Quick moves between postures that are held for a second or so, in 0..1: gravity, sticking, creep."""
+    """Quick moves between configurations that are held for a second or so, in 0..1: gravity, sticking, creep."""
     return _held(time, (0.6, 1.4), 0.15, rng)
 
 
 def steps(time: Array, rng: np.random.Generator) -> Array:
-    """Postures commanded within two hundredths of a second and held, in 0..1: all the torque that a motor has."""
+    """Configurations commanded within two hundredths of a second and held, in 0..1: all the torque that a motor has."""
     return _held(time, (0.4, 0.8), 0.02, rng)
 
 
@@ -96,11 +96,11 @@ KINDS: dict[str, Callable[[Array, np.random.Generator], Array]] = {
 
 FORCE = 2.0  # [N] the largest, on the last link
 WEIGHTS = 4  # of which the first is none
-SIDE = 0.1  # [rad] from either side of which a loaded posture is approached, so that friction cancels
+SIDE = 0.1  # [rad] from either side of which a loaded configuration is approached, so that friction cancels
 MOVE, HOLD = 0.5, 1.0  # [s] of each approach and of each hold
-SWEEP, SWEEP_TIME = 0.2, 4.0  # [rad], [s] of the command about a clamped posture
+SWEEP, SWEEP_TIME = 0.2, 4.0  # [rad], [s] of the command about a clamped configuration
 PRESS, APPROACH = 0.1, 2.0  # [rad] beyond the touch, [s] to get there; then HOLD
-BEFORE_TOUCH = 0.2  # [rad] from the posture to the obstacle
+BEFORE_TOUCH = 0.2  # [rad] from the configuration to the obstacle
 SETTLED = 0.5  # last share of a touch, at rest
 
 BenchTrial = tuple[TrialEntry, Array]
@@ -169,7 +169,7 @@ def bench_trials(
     return [trial for number in range(initialisations) for test in chosen for trial in test(rig, number, rng)]
 
 
-def _posture(rig: Recording, rng: np.random.Generator) -> Array:
+def _configuration(rig: Recording, rng: np.random.Generator) -> Array:
     """Angles (joints,) [rad] in the middle half of every joint's range."""
     low, high = np.array([safe_range(rig.rig.joints[joint], 0.5) for joint in rig.joints]).T
     return np.asarray(rng.uniform(low, high))
@@ -180,8 +180,8 @@ def _time(rig: Recording, duration: float) -> Array:
 
 
 def _known_force(rig: Recording, number: int, rng: np.random.Generator) -> list[BenchTrial]:
-    """One posture, approached from both sides under several weights that pull one way; a trial for each weight."""
-    posture, direction = _posture(rig, rng), rng.normal(size=3)
+    """One configuration, approached from both sides under several weights that pull one way; one trial a weight."""
+    configuration, direction = _configuration(rig, rng), rng.normal(size=3)
     direction /= np.linalg.norm(direction)
     tree = rig.rigid_body()  # the force acts as far beyond the last link's centre of mass as the joint is before it
     last, point = tree.dof_names[-1], (2 * tree.com[-1]).tolist()
@@ -193,25 +193,25 @@ def _known_force(rig: Recording, number: int, rng: np.random.Generator) -> list[
         file = f"trials/known_force_{number}_{weight}.parquet"
         force = KnownForce(joint=last, point=point, vector=vector)
         entry = TrialEntry(file=file, initialisation=number, kind="known_force", force=force)
-        trials.append((entry, posture + sides[:, None]))
+        trials.append((entry, configuration + sides[:, None]))
     return trials
 
 
 def _clamped(rig: Recording, number: int, rng: np.random.Generator) -> list[BenchTrial]:
-    """Links held still while every command sweeps about the posture: the drive alone gives way."""
+    """Links held still while every command sweeps about the configuration: the drive alone gives way."""
     sweep = SWEEP * np.sin(2 * np.pi * _time(rig, SWEEP_TIME) / SWEEP_TIME)
     file = f"trials/clamped_{number}.parquet"
     entry = TrialEntry(file=file, initialisation=number, kind="clamped", clamped=True)
-    return [(entry, _posture(rig, rng) + sweep[:, None])]
+    return [(entry, _configuration(rig, rng) + sweep[:, None])]
 
 
 def _touch(rig: Recording, number: int, rng: np.random.Generator) -> list[BenchTrial]:
     trials = []
     for index, joint in enumerate(rig.joints):
-        posture = _posture(rig, rng)
-        angle = float(posture[index] + BEFORE_TOUCH)
+        configuration = _configuration(rig, rng)
+        angle = float(configuration[index] + BEFORE_TOUCH)
         way = np.clip(_time(rig, APPROACH + HOLD) / APPROACH, 0.0, 1.0)
-        command = np.tile(posture, (len(way), 1))
+        command = np.tile(configuration, (len(way), 1))
         command[:, index] += (BEFORE_TOUCH + PRESS) * way
         file, touch = f"trials/touch_{number}_{joint}.parquet", Touch(joint=joint, angle=angle)
         entry = TrialEntry(file=file, initialisation=number, kind="touch", touch=touch)

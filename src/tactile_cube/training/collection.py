@@ -214,7 +214,7 @@ class MultiSyncCollection:
         return sum(map(_cpu_seconds, self._processes)) if self._final_cpu is None else self._final_cpu
 
     def close(self) -> None:
-        """End the workers: nothing in them is worth a wait, and one that is stuck would not listen."""
+        """End the workers: nothing in them is worth a wait, and a stuck one would not react."""
         self._final_cpu = self.cpu_seconds()
         self._kill()
         closing = self._thread.submit(partial(self._collector.shutdown, timeout=1.0, raise_on_error=False))

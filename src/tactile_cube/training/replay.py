@@ -21,7 +21,7 @@ FLAGS: tuple[NestedKey, ...] = (("next", "terminated"), "demonstrated")
 class Replay:
     """Experience replay.
 
-    Rewards are kept as unweighted terms and weighed at sampling, so that a schedule of the weights leaves no stale
+    Rewards are kept as unweighted terms and weighted at sampling, so that a schedule of the weights leaves no stale
     rewards.
 
     Args:

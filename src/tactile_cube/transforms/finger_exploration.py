@@ -33,7 +33,7 @@ class Exploration:
 
     Attributes:
         episodes: part of the episodes that explore.
-        probability: with which a step of such an episode begins to hold a random target.
+        probability: with which a step of one of them begins to hold a random target.
         shortest: fewest steps that a target is held.
         longest: most steps that it is held.
         single: only one finger at a time does; else also pairs and all of them, which in the air costs the object.

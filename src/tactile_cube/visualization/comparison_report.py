@@ -189,7 +189,7 @@ def test_section(comparison: Comparison) -> Section:
     above = [joint for joint, ratio in ratios.items() if ratio > AT_THE_FLOOR]
     text = (
         f"Not at {', '.join(above)}: the error is above the noise floor. Noise follows no other signal; the error "
-        "follows the signals below, which hint at its cause. 'By chance' is the probability of such a correlation "
+        "follows the signals below, which hint at its cause. 'By chance' is the probability of that correlation "
         "between unrelated signals with the same autocorrelation."
         if above
         else "Yes, as far as this recording can tell: no joint's error is above the noise floor. A free-running "

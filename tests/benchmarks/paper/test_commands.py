@@ -1,4 +1,4 @@
-"""The commands of `benchmarks.paper` and `benchmarks.teacher` as one types them."""
+"""The commands of `benchmarks.paper` and `benchmarks.gait` as one types them."""
 
 import sys
 from pathlib import Path
@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 import yaml
 
+from benchmarks.gait import __main__ as gait
 from benchmarks.paper import __main__ as paper
 from benchmarks.paper import ship
 from benchmarks.paper.model_card import read_card
-from benchmarks.teacher import __main__ as teacher
 from tactile_cube.evaluation.policy_path import SHIPPED
 from tactile_cube.training.ledger import LEDGER
 
@@ -51,6 +51,6 @@ def test_a_policy_is_shipped_with_its_card(tmp_path: Path, monkeypatch: pytest.M
 def test_a_gait_is_searched_for_another_hand_and_task(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     words = ("task=table", "task.episode_steps=3", "--generations", "1", "--population", "4", "--worlds", "1")
     typed(monkeypatch, "hand=three_finger", *words, "--out", str(tmp_path))
-    teacher.main()
+    gait.main()
     assert len(yaml.safe_load((tmp_path / "gait.yaml").read_text())["gaits"]["phases"]) == 3
     assert (tmp_path / LEDGER).is_file()

@@ -72,10 +72,10 @@ def test_the_card_says_how_it_was_made_and_what_it_does() -> None:
         assert fact in card
 
 
-def test_the_card_of_a_fine_tuned_policy_names_the_teacher_of_the_run_before(tmp_path: Path) -> None:
+def test_the_card_of_a_fine_tuned_policy_names_the_demonstrations_of_the_run_before(tmp_path: Path) -> None:
     (tmp_path / "card.md").write_text(model_card("default", INFO, RUNS, [], ""))
     taught = "a scripted gait in 30 % of the episodes, imitated with weight 2 (curriculum)"
-    assert read_card(tmp_path / "card.md")["teacher"] == taught
+    assert read_card(tmp_path / "card.md")["demonstrations"] == taught
 
 
 def test_the_ancestry_lists_each_run_with_its_settings() -> None:
@@ -94,11 +94,6 @@ def test_the_ancestry_lists_each_run_with_its_settings() -> None:
 def test_the_ancestry_is_read_back_from_a_card() -> None:
     runs = [Ancestor("search_gait"), *RUNS[1:]]
     assert read_table(model_card("default", INFO, runs, [], "")) == runs
-
-
-def test_a_policy_that_taught_is_named() -> None:
-    shown = {"exploration": {"demonstrations": 0.3, "teacher": "policies/default.safetensors"}}
-    assert in_words(shown)["teacher"] == "the policy default in 30 % of the episodes, imitated with weight 0"
 
 
 def test_starts_in_grasps_are_named() -> None:
@@ -156,7 +151,7 @@ def test_the_card_of_a_shipped_policy_counts_its_whole_ancestry(card: Path) -> N
         earlier = {run.name for run in runs[:index]}
         begun = one.settings.get("begins with", "fresh networks")
         assert begun == "fresh networks" or {Path(begun).name, Path(begun).parent.name} & earlier
-        assert "gait" not in one.teacher or "search_gait" in earlier
+        assert "gait" not in one.shown or "search_gait" in earlier
 
 
 @pytest.mark.parametrize("content", ["", "{}", "[]"])

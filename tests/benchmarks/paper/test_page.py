@@ -104,8 +104,8 @@ def test_the_newest_run_counts() -> None:
 def test_what_training_cost_is_read_from_the_shipped_card() -> None:
     card = read_card(SHIPPED / "published.md")
     assert float(card["CPU hours"].split()[0]) > 0
-    cost = f"{card['CPU hours']}; teacher: {card['teacher']}"
-    assert f"| 600, without a teacher | {cost} | `python" in line(
+    cost = f"{card['CPU hours']}; demonstrations: {card['demonstrations']}"
+    assert f"| 600, without demonstrations | {cost} | `python" in line(
         paper_page([results("paper", "published")]), "CPU hours"
     )
 

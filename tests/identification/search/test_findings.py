@@ -7,8 +7,9 @@ import pytest
 
 from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.identification.criteria import Criteria
+from tactile_cube.identification.search.candidates import Candidate
 from tactile_cube.identification.search.explanation import named_by
-from tactile_cube.identification.search.findings import find
+from tactile_cube.identification.search.findings import find, together
 from tactile_cube.identification.search.proposals import press
 from tactile_cube.identification.search.search import BestSoFar, Search
 from tactile_cube.identification.verdict import decide
@@ -68,3 +69,11 @@ def test_a_law_is_never_made_much_larger_than_its_own_steps_made_it() -> None:
     assert press(np.full((2, 1), 1.0), gram, 0.0) == pytest.approx(2.0), "as it is it takes away all that it changes"
     assert press(np.full((2, 1), 10.0), gram, 0.0) == pytest.approx(2 * (2 * 2.0 * 10.0 - 4.0)), "twice, not ten times"
     assert press(np.full((2, 1), -1.0), gram, 0.0) == 0.0, "and not turned round"
+
+
+def test_of_one_law_at_many_joints_no_joint_is_taken_out_alone() -> None:
+    delay, friction = (find_effect(name) for name in ("command_delay", "viscous_friction"))
+    six = [Candidate(delay, (f"joint{k}",), {"delay": 0.02}) for k in range(6)]
+    assert together(six[:4]) == [[0], [1], [2], [3]]
+    assert together(six) == [[0, 1, 2, 3, 4, 5]]
+    assert together([*six, Candidate(friction, ("joint0",), {"damping": 0.1})]) == [[0, 1, 2, 3, 4, 5], [6]]

@@ -160,7 +160,7 @@ def test_another_leader_than_the_urdfs_is_warned_of(leader: str | None, said: bo
 
 @pytest.fixture
 def held(tmp_path: Path) -> Recording:
-    """Two trials at rest in many postures, the torques those of the links' weight."""
+    """Two trials at rest in many configurations, the torques those of the links' weight."""
     recording = read_recording(write(tmp_path, setting({"gravity": [6.0, 0.0, -7.8]})))
     tree, trials = recording.rigid_body(), []
     for trial in recording.trials:

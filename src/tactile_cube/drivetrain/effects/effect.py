@@ -32,7 +32,7 @@ class Scales:
         high: highest [rad].
         speed: largest speed of the joint, without a few samples [rad/s].
         command_speed: largest speed of the command, without a few samples [rad/s].
-        inertia: at the mean posture, rotor included [kg m^2].
+        inertia: at the mean configuration, rotor included [kg m^2].
         mass: of all links that the joint moves [kg].
         lever: radius of gyration of these links about the joint [m].
         time: the time that corresponds to 1 s of a finger, a power of ten [s].

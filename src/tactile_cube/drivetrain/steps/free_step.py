@@ -21,7 +21,7 @@ Integers = npt.NDArray[np.int64]
 
 PATH_WIDTH = C * (3 * n + 2 * n * n)
 """Numbers of a step, for each chain: position, bias, weight (n each); mass matrix without rotors, slope (n, n)."""
-SLOPE_EVERY = 4  # steps; the slope of the equations of motion changes with the posture, slowly
+SLOPE_EVERY = 4  # steps; the slope of the equations of motion changes with the configuration, slowly
 SLOPE_STEP = 1e-5  # [rad]
 
 

@@ -54,7 +54,7 @@ def find_equations(c: int, q: Array, v: Array, memory: Array) -> None:
     M_joint, h_joint = block(memory, plant.JOINT_MASS_MATRIX, (n, n)), block(memory, plant.JOINT_BIAS, (n,))
     ratio, rotor = block(memory, plant.RATIO, (N,), c), block(memory, plant.REFLECTED_INERTIA, (n,), c)
     reduce_equations(plant.FOLLOW, ratio, M, h, rotor, M_joint, h_joint)
-    if memory[plant.WEIGHED] != 0.0:
+    if memory[plant.NEEDS_WEIGHT] != 0.0:
         x, weight = signals_of(c, memory), block(memory, plant.WEIGHT, (N,))
         x[sig.WEIGHT, :] = 0.0
         weight[:] = 0.0

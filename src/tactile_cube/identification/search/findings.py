@@ -26,12 +26,15 @@ from tactile_cube.identification.search.explanation import (
 from tactile_cube.identification.search.proposals import (
     CLOSE,
     Looks,
+    Tried,
     detailed,
     explains_most,
     further,
     grown,
+    left_by,
     look,
     near,
+    of_a_kind,
     off,
     refitted,
     without,
@@ -138,20 +141,21 @@ def laws_of(one: Proposal) -> int:
 
 
 def reduced(search: Search, one: Proposal) -> list[Proposal]:
-    """Sets that are left when one effect after another is taken out, the one that is missed least.
-
-    More effects than `MOST` are few laws at many joints: a law is then taken out at all of them.
-    """
+    """Sets that are left when one effect after another is taken out, the one that is missed least."""
     found: list[Proposal] = []
     while (laws_of(one) > 1 or 1 < len(one.effects) <= MOST) and not search.spent:
-        groups = [[place] for place in range(len(one.effects))]
-        if len(groups) > MOST:
-            names = [effect.effect.name for effect in one.effects]
-            groups = [[place for place, name in enumerate(names) if name == law] for law in dict.fromkeys(names)]
-        less = [without(search, one, *places) for places in groups]
+        less = [without(search, one, *places) for places in together(one.effects)]
         found += less
         one = min(less, key=lambda e: e.fit.cost)
     return found
+
+
+def together(effects: Sequence[Candidate]) -> list[list[int]]:
+    """Places of effects to be taken out together: each by itself; of more than `MOST`, those of one law."""
+    if len(effects) <= MOST:
+        return [[place] for place in range(len(effects))]
+    names = [effect.effect.name for effect in effects]
+    return [[place for place, name in enumerate(names) if name == law] for law in dict.fromkeys(names)]
 
 
 def cheapest(found: Sequence[Proposal], search: Search) -> list[Proposal]:
@@ -170,30 +174,42 @@ def twins(search: Search, chosen: Explanation, first: Looks, judged: Sequence[Ex
     """
     known = {named_by(one.effects) for one in judged}
     itself, found = Proposal(chosen.effects, chosen.fit), list[Proposal]()
-    for place, effect in enumerate(chosen.effects):
-        looks, simpler = first, simpler_laws(search, chosen, place)
-        if len(chosen.effects) > 1:
-            looks = look(search, without(search, itself, place), list(effect.joints))
+    for places in together(chosen.effects):
+        replaced, looks = [chosen.effects[place] for place in places], first
+        simpler = set.intersection(*(simpler_laws(search, chosen, place) for place in places))
+        if len(places) < len(chosen.effects):
+            joints = [joint for effect in replaced for joint in effect.joints]
+            looks = look(search, without(search, itself, *places), joints)
             if (left := named_by(looks.parent.effects)) not in known:
                 known.add(left)
                 found.append(looks.parent)
+        most = sum(effect.size for effect in replaced) + 1
         laws = [
             one
-            for one in looks.tried
-            if one[0].effect.name in simpler
-            or (one[0].size <= effect.size + 1 and explains_most(search, looks, one[1]))
+            for one in instead(looks, replaced)
+            if one[0][0].effect.name in simpler
+            or (sum(law.size for law, _ in one) <= most and explains_most(search, looks, left_by(looks, one)))
         ]
-        laws.sort(key=lambda one: (one[0].effect.name not in simpler, one[0].effect.name not in effect.effect.contains))
-        for candidate, fitted in laws[: 2 * JUDGED]:
-            names = named_by((*looks.parent.effects, candidate))
+        contained = replaced[0].effect.contains
+        laws.sort(key=lambda one: (one[0][0].effect.name not in simpler, one[0][0].effect.name not in contained))
+        for one in laws[: 2 * JUDGED]:
+            names = named_by((*looks.parent.effects, *(law for law, _ in one)))
             if len(found) >= JUDGED or names in known or search.spent:
                 continue
             known.add(names)
-            if not near(search, looks, fitted, [itself]):
-                fitted = further(looks, fitted)
-            if candidate.effect.name in simpler or near(search, looks, fitted, [itself]):
-                found.append(refitted(search, looks, [(candidate, fitted)]))
+            if not near(search, looks, left_by(looks, one), [itself]):
+                one = tuple((law, further(looks, fitted)) for law, fitted in one)
+            if one[0][0].effect.name in simpler or near(search, looks, left_by(looks, one), [itself]):
+                found.append(refitted(search, looks, one))
     return [one for one in found if one.fit.cost <= CLOSE * chosen.fit.cost]
+
+
+def instead(looks: Looks, replaced: Sequence[Candidate]) -> list[Tried]:
+    """What may stand for some effects, best first: any law for a single one, one law at as many joints for several."""
+    if len(replaced) == 1:
+        return [(one,) for one in looks.tried]
+    kinds = [places for places in of_a_kind([law for law, _ in looks.tried]) if len(places) == len(replaced)]
+    return sorted((tuple(looks.tried[k] for k in kind) for kind in kinds), key=lambda one: left_by(looks, one))
 
 
 def simpler_laws(search: Search, chosen: Explanation, place: int) -> set[str]:

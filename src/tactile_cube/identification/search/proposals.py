@@ -36,6 +36,10 @@ SINGLES, SETS = 4, 3  # laws, and sets of several, that are refitted exactly
 CLOSE = 2.5  # squared error over the best one's up to which another law may do as well when everything is free
 
 
+Tried = tuple[tuple[Candidate, Fit], ...]
+"""Laws that are added together, each after its own steps."""
+
+
 @dataclass(frozen=True)
 class Looks:
     """Every law beside a fitted set, after two steps of its own.
@@ -129,8 +133,8 @@ def grown(search: Search, looks: Looks) -> list[Proposal]:
     for one in list(by_name.values())[:SINGLES]:
         if search.spent:
             break
-        if not whole(search, found) or near(search, looks, one[1], found):
-            found.append(refitted(search, looks, [one]))
+        if not whole(search, found) or near(search, looks, one[1].cost, found):
+            found.append(refitted(search, looks, (one,)))
     if not whole(search, found):
         found += [refitted(search, looks, laws) for laws in sets(looks)[:SETS] if not search.spent]
     return sorted(found, key=lambda one: one.price(search.criteria))
@@ -141,17 +145,22 @@ def whole(search: Search, found: Sequence[Proposal]) -> bool:
     return any(not off(search, one.fit) for one in found)
 
 
-def near(search: Search, looks: Looks, fitted: Fit, found: Sequence[Proposal]) -> bool:
-    """Whether a law has come near the best set by its own steps, on few windows."""
-    left = fitted.cost / np.count_nonzero(looks.problem.weight)
-    return bool(left <= CLOSE * min(search.over_noise(one.fit) for one in found) ** 2)
+def near(search: Search, looks: Looks, left: float, found: Sequence[Proposal]) -> bool:
+    """Whether what laws leave after their own steps, on few windows, has come near the best set."""
+    count = np.count_nonzero(looks.problem.weight)
+    return bool(left / count <= CLOSE * min(search.over_noise(one.fit) for one in found) ** 2)
 
 
-def explains_most(search: Search, looks: Looks, fitted: Fit) -> bool:
-    """Whether a law has explained most of what the set leaves above the noise by its own steps."""
+def explains_most(search: Search, looks: Looks, left: float) -> bool:
+    """Whether laws have explained most of what the set leaves above the noise by their own steps."""
     count = np.count_nonzero(looks.problem.weight)
     most = search.criteria.most
-    return bool(fitted.cost - count <= max((1.0 - most) * (looks.alike.cost - count), (CLOSE - 1.0) * count))
+    return bool(left - count <= max((1.0 - most) * (looks.alike.cost - count), (CLOSE - 1.0) * count))
+
+
+def left_by(looks: Looks, laws: Tried) -> float:
+    """Squared error that laws leave after their own steps: of several, what each has taken away counts."""
+    return laws[0][1].cost - sum(looks.alike.cost - fitted.cost for _, fitted in laws[1:])
 
 
 def further(looks: Looks, fitted: Fit) -> Fit:
@@ -160,7 +169,7 @@ def further(looks: Looks, fitted: Fit) -> Fit:
     return fit(looks.problem, fitted.model, own, MORE_STEPS, looks.frozen)
 
 
-def refitted(search: Search, looks: Looks, laws: Sequence[tuple[Candidate, Fit]]) -> Proposal:
+def refitted(search: Search, looks: Looks, laws: Tried) -> Proposal:
     """A set with some laws more, each at its own fit to begin with, everything free."""
     known = len(looks.frozen.model.terms)
     terms = [term for _, fitted in laws for term in fitted.model.terms[known:]]
@@ -182,7 +191,7 @@ def detailed(search: Search, one: Proposal) -> Proposal | None:
     return Proposal((*one.effects[:-1], candidate), search.refitted(model))
 
 
-def sets(looks: Looks) -> list[tuple[tuple[Candidate, Fit], ...]]:
+def sets(looks: Looks) -> list[Tried]:
     """Pairs of laws, and one law at several joints, by what trials that they were not sized by would gain, best first.
 
     What each law changes is known from its own fit; together they are sized by least squares, on all trials but one in
@@ -201,7 +210,7 @@ def sets(looks: Looks) -> list[tuple[tuple[Candidate, Fit], ...]]:
         gained = press(gradient[:, rows], gram[part], expected)
         if gained > alone[rows].max():
             found.append((gained, tuple(laws[k] for k in rows)))
-    first: dict[frozenset[tuple[str, str]], tuple[tuple[Candidate, Fit], ...]] = {}
+    first: dict[frozenset[tuple[str, str]], Tried] = {}
     for _, together in sorted(found, key=lambda one: -one[0]):
         first.setdefault(named_by([candidate for candidate, _ in together]), together)
     return list(first.values())
@@ -212,10 +221,15 @@ def wanted_sets(laws: Sequence[Candidate]) -> Iterator[list[int]]:
     for pair in combinations(range(len(laws)), 2):
         if named_by([laws[pair[0]]]) != named_by([laws[pair[1]]]):
             yield list(pair)
+    yield from (places for places in of_a_kind(laws) if len(places) > 2)
+
+
+def of_a_kind(laws: Sequence[Candidate]) -> list[list[int]]:
+    """Places of one law in one form at every joint where it was tried, law by law."""
     kinds: dict[tuple[str, tuple[str, ...]], dict[tuple[str, ...], int]] = {}
     for place, law in enumerate(laws):
         kinds.setdefault((law.effect.name, tuple(law.form)), {}).setdefault(law.joints, place)
-    yield from (list(places.values()) for places in kinds.values() if len(places) > 2)
+    return [list(places.values()) for places in kinds.values()]
 
 
 def products(problem: Problem, frozen: Fit, fits: Sequence[Fit]) -> tuple[Array, Array]:

@@ -98,7 +98,7 @@ def _standard(values: Array) -> Array:
     return np.asarray(centred / np.maximum(centred.std(axis=0), np.finfo(float).tiny))
 
 
-CHANCE, ORDERS = 0.01, 5000  # probability of such a drift by chance, and random orders of the repeats that tell it
+CHANCE, ORDERS = 0.01, 5000  # probability of that drift by chance, and random orders of the repeats that tell it
 FEWEST_REPEATS = 3
 
 

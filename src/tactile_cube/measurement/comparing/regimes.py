@@ -177,7 +177,7 @@ class Whiteness:
     """Ljung-Box test of one joint's residual."""
 
     joint: str
-    p_value: float  # of such autocorrelation in white noise; the smallest over the trials, times their number
+    p_value: float  # of that autocorrelation in white noise; the smallest over the trials, times their number
     correlation_time: float  # autocorrelation time of the residual [s]
 
 
@@ -189,7 +189,7 @@ class CrossCorrelation:
     cause: str  # the signal, in words
     correlation: float  # strongest within 0.1 s, averaged over the trials
     delay: float  # how much later the residual shows it [s]
-    p_value: float  # of such a correlation between unrelated signals with the same autocorrelation
+    p_value: float  # of that correlation between unrelated signals with the same autocorrelation
 
 
 def whiteness(trials: Sequence[Trial], errors: Sequence[Array], joints: Sequence[str]) -> list[Whiteness]:

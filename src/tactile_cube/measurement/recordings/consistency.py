@@ -112,7 +112,7 @@ def check_inertia(recording: Recording) -> None:
 
 
 SLOW = 0.1  # [rad/s] below which a torque holds weight and friction alone
-MOST_SAMPLES = 200  # postures change slowly
+MOST_SAMPLES = 200  # configurations change slowly
 FEWEST = 30
 BETTER = 0.72  # a swap must leave less than this share of the missing torque
 NEGLIGIBLE = 0.01  # [N m] of missing torque that friction explains

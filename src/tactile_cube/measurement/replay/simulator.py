@@ -184,7 +184,7 @@ class Simulator:
         paths = np.zeros((len(windows), 1))
         if near is not None and (not follows or np.array_equal(near.mechanics, self._mechanics(memory[0]))):
             paths = near.steps
-            self.plant.view(memory, "follows" if follows else "weighed")[:] = 1.0
+            self.plant.view(memory, "follows" if follows else "needs_weight")[:] = 1.0
         gap = gaps(self.plant, memory[0])
         ratios = self._jump_ratios(memory, windows)
         limit = self.plant.view(memory, "torque_limit")[:, None].copy()

@@ -84,7 +84,7 @@ class SimulatedSession:
             terms = (*terms, *terms_of([(f"joint_stop@{entry.touch.joint}", stop)], rig.recording.joints))
         model = Model(true.constants, terms, {trial.initialisation: -offset})
         ((result,),) = rig.free_runs([model], [trial])
-        if entry.force is not None:  # a force pulls at the posture that it leads to
+        if entry.force is not None:  # a force pulls at the configuration that it leads to
             ((result,),) = rig.free_runs([model], [replace(trial, position=result.position)])
         return self.logged(entry, command, Simulated(result.position[settle:], result.torque[settle:]), rng)
 

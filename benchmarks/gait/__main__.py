@@ -1,6 +1,6 @@
 """Search for a scripted gait that turns the object: what `exploration=demonstrations` plays.
 
-    python -m benchmarks.teacher hand=three_finger task=table --generations 20
+    python -m benchmarks.gait hand=three_finger task=table --generations 20
 
 Words such as `task=table` are those of `train`. The best gaits are tried again in fresh
 episodes; gait.yaml has the result, ledger.json the cost.
@@ -13,7 +13,7 @@ from pathlib import Path
 import yaml
 
 import tactile_cube
-from benchmarks.teacher.gait_search import search_gait, write_gait
+from benchmarks.gait.gait_search import search_gait, write_gait
 from tactile_cube.training.ledger import LEDGER, Ledger
 from tactile_cube.transforms.make_env import rotation_env
 

@@ -170,7 +170,7 @@ def write_gait(path: Path, found: Found, seed: int, costs: Costs) -> None:
         "kept": found.best.kept,
         "gaits_tried": found.tried,
         "seed": seed,
-        "command": shlex.join(["python", "-m", "benchmarks.teacher", *sys.argv[1:]]),
+        "command": shlex.join(["python", "-m", "benchmarks.gait", *sys.argv[1:]]),
     }
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(yaml.safe_dump(data, sort_keys=False))

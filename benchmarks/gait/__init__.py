@@ -1,0 +1,1 @@
+"""Search for the scripted gait that `exploration=demonstrations` plays."""

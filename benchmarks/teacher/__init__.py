@@ -1,1 +1,0 @@
-"""The teacher of the recipe: a search for the scripted gait that `exploration=demonstrations` plays."""
