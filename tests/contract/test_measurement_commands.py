@@ -118,6 +118,31 @@ def test_from_a_lerobot_data_set_to_a_named_effect_by_one_command(hidden, named,
     assert read_model(tmp_path / "run" / "model.yaml").provenance.recording.endswith("run/recording")
 
 
+def test_what_is_known_already_is_no_news_to_diagnose(tmp_path: Path) -> None:
+    settings = ["source.duration=4", "source.kinds=[ramps,multisine]", 'source.hidden=["torque_bias@b: bias=0.05"]']
+    made = run("record", *made_rig(tmp_path, *settings), folder=tmp_path)
+    assert made.returncode == 0, made.stderr
+    words = ["recording=made"]
+    fitted = run("identify", *words, "effects=[torque_bias@b]", "hydra.run.dir=known", folder=tmp_path)
+    assert fitted.returncode == 0, fitted.stderr
+    words += ["hydra.run.dir=run"]
+    asked = run("diagnose", *words, "model=known/model.yaml", folder=tmp_path)
+    assert asked.returncode == 0, asked.stderr
+    result = json.loads((tmp_path / "run" / "diagnosis.json").read_text())
+    assert (result["verdict"], result["effects"]) == ("adequate", [])
+    assert result["known_effects"] == ["torque_bias@b"]
+    assert result["error"]["nominal"] < 2 * result["error"]["noise_floor"], "the error of the model that was given"
+    assert "beside what was known: torque_bias@b" in asked.stdout
+    (effect,) = read_model(tmp_path / "run" / "model.yaml").effects
+    assert effect.effect == "torque_bias@b"
+    assert effect.parameters["bias"].low <= 0.05 <= effect.parameters["bias"].high
+
+    (tmp_path / "other.yaml").write_text("joints: [x]\n")
+    refused = run("diagnose", *words, "model=other.yaml", folder=tmp_path)
+    assert refused.returncode == 2
+    assert "model: joints ['x'] are not those of the recording" in refused.stderr
+
+
 def test_a_grasp_is_compared_too(tmp_path: Path) -> None:
     settings = ["source=grasp", "source.kinds=[twist]", "source.levers=[0.06]", "source.initialisations=1"]
     made = typed("record", "out=grip", *settings, "source.validation=false", folder=tmp_path)
