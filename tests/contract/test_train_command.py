@@ -140,9 +140,7 @@ def test_another_loss_of_torchrl_is_a_file_of_its_own(tmp_path: Path) -> None:
     short = ["--config-dir", "my_conf", "agent=mine", "+experiment=smoke", "collector=single", "collector.worlds=4"]
     short += ["training.learning_starts=100"]
     for steps in (160, 200):  # the second goes on
-        run = typed(
-            "train", "--config-dir", "my_conf", "agent=mine", *short, f"training.steps={steps}", folder=tmp_path
-        )
+        run = typed("train", *short, f"training.steps={steps}", folder=tmp_path)
         assert run.returncode == 0, run.stderr
         assert f"all {steps} steps done" in run.stdout
     learned = load_checkpoint(tmp_path / "outputs/train/smoke-seed0/checkpoint.pt")["learner"]
