@@ -284,7 +284,9 @@ def test_a_folder_is_dropped_whole(window: Any, tmp_path: Path) -> None:
         devtools.send("Input.dispatchDragEvent", {"type": kind, "x": 200, "y": 600, "data": data})
     window.get_by_text("To be imported: chunk-000_file-000.parquet with").wait_for()
     window.get_by_role("button", name="wheel", exact=True).click()
-    window.get_by_role("columnheader", name="action.shoulder.pos").wait_for()
+    column = window.get_by_role("columnheader", name="action.shoulder.pos")
+    column.wait_for()
+    assert column.is_visible()
 
 
 def test_a_wrong_file_is_named_with_what_to_do(window: Any, measured: Recording) -> None:
