@@ -9,7 +9,16 @@ from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.resolution import Fitted, final_fit
 from tactile_cube.identification.search.evidence import worse
-from tactile_cube.identification.search.explanation import Explanation, contains, named, proven, simplest, sound
+from tactile_cube.identification.search.explanation import (
+    Explanation,
+    complete,
+    contains,
+    nameable,
+    named,
+    proven,
+    simplest,
+    sound,
+)
 from tactile_cube.identification.search.findings import Findings
 from tactile_cube.identification.search.residual_shape import Shape, black_box, missing_torques, shapes
 from tactile_cube.identification.search.search import Search
@@ -46,13 +55,10 @@ def decide(findings: Findings, criteria: Criteria = STANDARD) -> Verdict:
     if not plausible:
         return Verdict("unknown_effect", closest(found, findings, criteria))
     chosen = simplest(plausible, criteria)
-    share = chosen.explained(base)
-    whole = chosen.largest_error <= criteria.tolerated or share > criteria.nearly_whole
-    whole &= chosen.error <= criteria.adequate or share >= criteria.most
-    if not whole and share < criteria.most:
+    if not nameable(chosen, base, criteria):
         return Verdict("unknown_effect", closest(likely, findings, criteria))
     rivals = find_rivals(chosen, plausible, criteria)
-    if not whole:
+    if not complete(chosen, base, criteria):
         return Verdict("partly_explained", chosen, rivals)
     return Verdict("ambiguous" if rivals else "missing_effect", chosen, rivals)
 

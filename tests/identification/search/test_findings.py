@@ -64,6 +64,16 @@ def test_a_search_that_may_simulate_little_ends_early_and_says_what_it_has_and_w
     assert lines[-1].endswith("; next: every law by itself")
 
 
+def test_a_search_that_comes_nowhere_near_the_whole_looks_no_further(tmp_path: Path) -> None:
+    """Play of 30 mrad among laws that take a tenth of it away: three laws more would leave too much as well."""
+    recording = simulated(tmp_path, Size(), find_effect("backlash"), {"gap": 0.03})
+    effects = tuple(find_effect(name) for name in ("coulomb_friction", "cogging", "transmission_error", "actuator_lag"))
+    lines = list[str]()
+    verdict = decide(find(Search(*held_out_split(recording), np.full(1, NOISE), effects, lines.append)))
+    assert verdict.kind == "unknown_effect"
+    assert [line for line in lines if " laws beside " in line][1:] == []
+
+
 def test_a_law_is_never_made_much_larger_than_its_own_steps_made_it() -> None:
     gram = np.full((2, 1, 1), 1.0)
     assert press(np.full((2, 1), 1.0), gram, 0.0) == pytest.approx(2.0), "as it is it takes away all that it changes"

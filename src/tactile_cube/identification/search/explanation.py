@@ -101,6 +101,18 @@ def proven(explanation: Explanation, criteria: Criteria = STANDARD) -> bool:
     return explanation.gain >= criteria.least_gain and explanation.p_value <= criteria.significant
 
 
+def complete(explanation: Explanation, base: Explanation, criteria: Criteria = STANDARD) -> bool:
+    """Whether a set leaves so little that nothing more is missing."""
+    share = explanation.explained(base)
+    little = explanation.largest_error <= criteria.tolerated or share > criteria.nearly_whole
+    return little and (explanation.error <= criteria.adequate or share >= criteria.most)
+
+
+def nameable(explanation: Explanation, base: Explanation, criteria: Criteria = STANDARD) -> bool:
+    """Whether a set is the whole or at least a part of the truth; what explains less is unknown."""
+    return complete(explanation, base, criteria) or explanation.explained(base) >= criteria.most
+
+
 def unproven(explanation: Explanation, criteria: Criteria = STANDARD) -> bool:
     """Whether a set explains much, and that may be chance."""
     return explanation.gain > criteria.detail and not proven(explanation, criteria)
@@ -124,5 +136,10 @@ class Proposal:
         return " & ".join(c.label for c in self.effects) or "the refitted model"
 
     def price(self, criteria: Criteria) -> float:
-        """Squared error, with as much for each number as an effect has to explain at least."""
-        return float(self.fit.cost / (1.0 - criteria.least_gain) ** sum(one.size for one in self.effects))
+        """Squared error with the price of its numbers."""
+        return priced(self.fit.cost, self.effects, criteria)
+
+
+def priced(cost: float, effects: Sequence[Candidate], criteria: Criteria) -> float:
+    """Squared error, with as much for each number as an effect has to explain at least."""
+    return float(cost / (1.0 - criteria.least_gain) ** sum(one.size for one in effects))

@@ -17,6 +17,7 @@ from tactile_cube.identification.search.evidence import Judgement, worse
 from tactile_cube.identification.search.explanation import (
     Explanation,
     Proposal,
+    nameable,
     named_by,
     proven,
     simplest,
@@ -105,8 +106,9 @@ def find(search: Search) -> Findings:
     if first and (good := found.proven(search.criteria)):
         chosen = simplest(sound(good, search.criteria), search.criteria)
         search.stand(f"{chosen.label} ({chosen.error:.2f} x sensor noise on held-out trials)", "its possible twins")
-        others = tuple(search.explained(one, looked) for one in twins(search, chosen, first, found.judged))
-        found = replace(found, judged=(*found.judged, *others))
+        if nameable(chosen, base, search.criteria):
+            others = tuple(search.explained(one, looked) for one in twins(search, chosen, first, found.judged))
+            found = replace(found, judged=(*found.judged, *others))
     return replace(found, stopped=search.following if search.spent else "")
 
 
@@ -130,9 +132,23 @@ def proposed(search: Search) -> tuple[list[Proposal], Looks | None]:
         found += tried
         if not tried or tried[0].price(search.criteria) >= parent.price(search.criteria):
             break
-        parent = tried[0]
+        before, parent = parent, tried[0]
+        if out_of_reach(search, before, parent):
+            break
         search.say.following = "one effect more, and each one taken out"
     return [*found, *reduced(search, parent)], first
+
+
+def out_of_reach(search: Search, before: Proposal, one: Proposal) -> bool:
+    """Whether a set will not come to be named, even if each further law takes away as much as each of the last did.
+
+    Those that take away most come first, so the next ones take less.
+    """
+    criteria, rows = search.criteria, np.count_nonzero(search.problem.weight)
+    taken = (before.fit.cost - one.fit.cost) / max(laws_of(one) - laws_of(before), 1)
+    left = one.fit.cost - (MOST - laws_of(one)) * taken - rows
+    enough = max((1.0 - criteria.most) * (search.base.fit.cost - rows), (criteria.tolerated**2 - 1.0) * rows)
+    return bool(left > enough)
 
 
 def laws_of(one: Proposal) -> int:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects.effect import Stage
+from tactile_cube.identification.criteria import Criteria
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit, noise_inflation, precision, renewed
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.search.candidates import (
@@ -22,7 +23,7 @@ from tactile_cube.identification.search.candidates import (
     without_effect,
 )
 from tactile_cube.identification.search.evidence import joint_errors, joint_squares
-from tactile_cube.identification.search.explanation import Proposal, named_by
+from tactile_cube.identification.search.explanation import Proposal, named_by, priced
 from tactile_cube.identification.search.residual_starts import residual_candidates
 from tactile_cube.identification.search.search import Search, some
 
@@ -136,7 +137,7 @@ def grown(search: Search, looks: Looks) -> list[Proposal]:
         if not whole(search, found) or near(search, looks, one[1].cost, found):
             found.append(refitted(search, looks, (one,)))
     if not whole(search, found):
-        found += [refitted(search, looks, laws) for laws in sets(looks)[:SETS] if not search.spent]
+        found += [refitted(search, looks, laws) for laws in sets(looks, search.criteria)[:SETS] if not search.spent]
     return sorted(found, key=lambda one: one.price(search.criteria))
 
 
@@ -191,8 +192,10 @@ def detailed(search: Search, one: Proposal) -> Proposal | None:
     return Proposal((*one.effects[:-1], candidate), search.refitted(model))
 
 
-def sets(looks: Looks) -> list[Tried]:
-    """Pairs of laws, and one law at several joints, by what trials that they were not sized by would gain, best first.
+def sets(looks: Looks, criteria: Criteria) -> list[Tried]:
+    """Pairs of laws, and one law at several joints, by what trials that they were not sized by would leave.
+
+    The cheapest come first, each in the form that would leave least.
 
     What each law changes is known from its own fit; together they are sized by least squares, on all trials but one in
     turn, from products that were summed trial by trial. Source: Allen, The relationship between variable selection and
@@ -209,11 +212,12 @@ def sets(looks: Looks) -> list[Tried]:
         part = np.ix_(range(len(gram)), rows, rows)
         gained = press(gradient[:, rows], gram[part], expected)
         if gained > alone[rows].max():
-            found.append((gained, tuple(laws[k] for k in rows)))
-    first: dict[frozenset[tuple[str, str]], Tried] = {}
-    for _, together in sorted(found, key=lambda one: -one[0]):
-        first.setdefault(named_by([candidate for candidate, _ in together]), together)
-    return list(first.values())
+            found.append((looks.alike.cost - gained, tuple(laws[k] for k in rows)))
+    first: dict[frozenset[tuple[str, str]], tuple[float, Tried]] = {}
+    for left, together in sorted(found, key=lambda one: one[0]):
+        effects = [candidate for candidate, _ in together]
+        first.setdefault(named_by(effects), (priced(left, effects, criteria), together))
+    return [together for _, together in sorted(first.values(), key=lambda one: one[0])]
 
 
 def wanted_sets(laws: Sequence[Candidate]) -> Iterator[list[int]]:
