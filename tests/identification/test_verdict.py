@@ -10,9 +10,9 @@ from tactile_cube.identification.criteria import Criteria
 from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.search.candidates import Candidate, forms, term_unknowns
 from tactile_cube.identification.search.evidence import Judgement, gain, worse
-from tactile_cube.identification.search.explanation import Explanation, proven, sound, unproven
+from tactile_cube.identification.search.explanation import Explanation, at_bound, proven, sound, unproven
 from tactile_cube.identification.search.findings import Findings
-from tactile_cube.identification.verdict import at_bound, decide, unexplained_joints
+from tactile_cube.identification.verdict import decide, unexplained_joints
 from tactile_cube.measurement.replay.model import Model, Term
 
 MODEL = Model({}, (), {})

@@ -1,6 +1,5 @@
 """From everything that was tried to an answer: one of five verdicts, and the simulations that it asks for."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
@@ -11,6 +10,7 @@ from tactile_cube.identification.fitting.resolution import Fitted, final_fit
 from tactile_cube.identification.search.evidence import worse
 from tactile_cube.identification.search.explanation import (
     Explanation,
+    at_bound,
     complete,
     contains,
     nameable,
@@ -48,17 +48,17 @@ def decide(findings: Findings, criteria: Criteria = STANDARD) -> Verdict:
     base = findings.base
     found = findings.kept(criteria)
     likely = [one for one in findings.proven(criteria) if not at_bound(one)]
-    plausible = [one for one in sound(likely, criteria) if any(one is other for other in found)]
+    possible = sound(likely, criteria)
+    plausible = [one for one in possible if any(one is other for other in found)]
     if not found:
         small = base.largest_error <= criteria.adequate
         return Verdict("adequate", base) if small else Verdict("unknown_effect", closest((), findings, criteria))
-    if not plausible:
-        return Verdict("unknown_effect", closest(found, findings, criteria))
-    chosen = simplest(plausible, criteria)
+    # where none is as good as the best, that one ends at an edge and stands in for what is missing beside the others
+    chosen = simplest(plausible or possible, criteria) if possible else base
     if not nameable(chosen, base, criteria):
-        return Verdict("unknown_effect", closest(likely, findings, criteria))
-    rivals = find_rivals(chosen, plausible, criteria)
-    if not complete(chosen, base, criteria):
+        return Verdict("unknown_effect", closest(likely if plausible else found, findings, criteria))
+    rivals = find_rivals(chosen, plausible or possible, criteria)
+    if not plausible or not complete(chosen, base, criteria):
         return Verdict("partly_explained", chosen, rivals)
     return Verdict("ambiguous" if rivals else "missing_effect", chosen, rivals)
 
@@ -68,20 +68,6 @@ def closest(found: Sequence[Explanation], findings: Findings, criteria: Criteria
     unclear = [one for one in findings.judged if not proven(one, criteria) and not at_bound(one)]
     possible = [findings.base, *found, *unclear]
     return min(possible, key=lambda one: one.judgement.costs.sum())
-
-
-def at_bound(one: Explanation) -> bool:
-    """Whether a number of its effects ends at the edge of what such a number may be.
-
-    Then the law stands in for another one: so do waves longer than the range of motion for any bent curve.
-    """
-    model = one.fit.model
-    return any(
-        math.isclose(unknown.of(model), edge, rel_tol=1e-6) and edge != unknown.neutral
-        for unknown in one.fit.unknowns
-        if unknown.kind == "effect" and unknown.place >= len(model.terms) - one.terms
-        for edge in (unknown.low, unknown.high)
-    )
 
 
 def find_rivals(

@@ -1,5 +1,6 @@
 """The search on small simulated machines: what is hidden is named, in a bounded number of simulations."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ from tactile_cube.identification.criteria import Criteria
 from tactile_cube.identification.search.candidates import Candidate
 from tactile_cube.identification.search.explanation import named_by
 from tactile_cube.identification.search.findings import find, together
-from tactile_cube.identification.search.proposals import press
+from tactile_cube.identification.search.proposals import press, telling
 from tactile_cube.identification.search.search import BestSoFar, Search
 from tactile_cube.identification.verdict import decide
 from tactile_cube.measurement.recordings.recording import Recording
@@ -72,6 +73,17 @@ def test_a_search_that_comes_nowhere_near_the_whole_looks_no_further(tmp_path: P
     verdict = decide(find(Search(*held_out_split(recording), np.full(1, NOISE), effects, lines.append)))
     assert verdict.kind == "unknown_effect"
     assert [line for line in lines if " laws beside " in line][1:] == []
+
+
+def test_laws_are_tried_where_a_set_fails_most(heavier: Recording) -> None:
+    search = Search(*held_out_split(heavier), np.full(1, NOISE), EFFECTS, lambda line: None)
+    windows = search.problem.windows
+    for window in (1, len(windows) - 2):
+        residual = np.zeros_like(search.base.fit.residual)
+        residual[window * windows.segments] = np.linspace(-5.0, 5.0, residual.shape[1])
+        few = telling(search, replace(search.base.fit, residual=residual))
+        assert 0 < len(few) < len(windows)
+        assert any(np.array_equal(one, windows.measured[window]) for one in few.measured)
 
 
 def test_a_law_is_never_made_much_larger_than_its_own_steps_made_it() -> None:

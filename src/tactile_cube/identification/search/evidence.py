@@ -128,9 +128,11 @@ def worse(other: Judgement, best: Judgement, criteria: Criteria = STANDARD) -> b
 def lacking(less: Judgement, more: Judgement, criteria: Criteria = STANDARD) -> bool:
     """Whether held-out trials prove what one set has beyond another that it contains.
 
-    It is no law in the place of another, that might differ in detail: it has to earn its price, beyond its scatter.
+    It has to earn its price, beyond its scatter. Where the smaller set leaves no more than is tolerated it has to take
+    more than a law may differ in detail from the real thing.
     """
-    return gain(less, more) > criteria.least_gain and standing_out(likelihood(less, more), more) > criteria.band
+    earned = gain(less, more) > criteria.least_gain and standing_out(likelihood(less, more), more) > criteria.band
+    return earned and (less.joint_errors.max() > criteria.tolerated or worse(less, more, criteria))
 
 
 def likelihood(before: Judgement, after: Judgement) -> Array:

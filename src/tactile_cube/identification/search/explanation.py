@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -143,3 +144,17 @@ class Proposal:
 def priced(cost: float, effects: Sequence[Candidate], criteria: Criteria) -> float:
     """Squared error, with as much for each number as an effect has to explain at least."""
     return float(cost / (1.0 - criteria.least_gain) ** sum(one.size for one in effects))
+
+
+def at_bound(one: Explanation | Proposal) -> bool:
+    """Whether a number of its effects ends at the edge of what such a number may be.
+
+    Then the law stands in for another one: so do waves longer than the range of motion for any bent curve.
+    """
+    model, added = one.fit.model, sum(len(effect.joints) for effect in one.effects)
+    return any(
+        math.isclose(unknown.of(model), edge, rel_tol=1e-6) and edge != unknown.neutral
+        for unknown in one.fit.unknowns
+        if unknown.kind == "effect" and unknown.place >= len(model.terms) - added
+        for edge in (unknown.low, unknown.high)
+    )

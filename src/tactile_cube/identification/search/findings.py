@@ -127,7 +127,8 @@ def proposed(search: Search) -> tuple[list[Proposal], Looks | None]:
             break
         search.say(f"{len(looks.scores)} starts of {looks.laws} laws beside {parent.label}")
         tried = [one for one in grown(search, looks) if laws_of(one) <= MOST]
-        tried += [richer for richer in (detailed(search, one) for one in tried[:1]) if richer]
+        details = [one for one in tried if one is tried[0] or len(one.effects) == len(parent.effects) + 1]
+        tried += [richer for richer in (detailed(search, one) for one in details) if richer]
         tried.sort(key=lambda one: one.price(search.criteria))
         found += tried
         if not tried or tried[0].price(search.criteria) >= parent.price(search.criteria):
@@ -213,9 +214,9 @@ def twins(search: Search, chosen: Explanation, first: Looks, judged: Sequence[Ex
             if len(found) >= JUDGED or names in known or search.spent:
                 continue
             known.add(names)
-            if not near(search, looks, left_by(looks, one), [itself]):
+            if not near(looks, left_by(looks, one), [itself]):
                 one = tuple((law, further(looks, fitted)) for law, fitted in one)
-            if one[0][0].effect.name in simpler or near(search, looks, left_by(looks, one), [itself]):
+            if one[0][0].effect.name in simpler or near(looks, left_by(looks, one), [itself]):
                 found.append(refitted(search, looks, one))
     return [one for one in found if one.fit.cost <= CLOSE * chosen.fit.cost]
 

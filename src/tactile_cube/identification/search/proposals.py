@@ -23,9 +23,10 @@ from tactile_cube.identification.search.candidates import (
     without_effect,
 )
 from tactile_cube.identification.search.evidence import joint_errors, joint_squares
-from tactile_cube.identification.search.explanation import Proposal, named_by, priced
+from tactile_cube.identification.search.explanation import Proposal, at_bound, named_by, priced
 from tactile_cube.identification.search.residual_starts import residual_candidates
-from tactile_cube.identification.search.search import Search, some
+from tactile_cube.identification.search.search import Search, spread
+from tactile_cube.measurement.replay.windows import Windows
 
 Array = NDArray[np.float64]
 LOOKED_AT = 4  # part of the segments to judge by, on which every law gets its own steps
@@ -33,7 +34,8 @@ PROMISING = 0.01  # of its joint's squared error: what a law promises less than 
 STEPS = 2  # of Gauss-Newton that every other law gets
 MORE_STEPS = 6  # that a law gets which may be a twin of the chosen one
 LARGER = 2.0  # times that a law may be in a set what its own steps made it: what it changes is known near that
-SINGLES, SETS = 4, 3  # laws, and sets of several, that are refitted exactly
+SINGLES = 4  # laws that are refitted exactly
+LEAVE_LEAST, CHEAPEST = 3, 2  # sets of several that are: own steps leave so much still that numbers may look too dear
 CLOSE = 2.5  # squared error over the best one's up to which another law may do as well when everything is free
 
 
@@ -70,18 +72,19 @@ class Looks:
 def off(search: Search, one: Fit) -> list[int]:
     """Joints whose error on the fitted trials is above the floor, the whole machine's included.
 
-    Of a set that has explained nearly all of a joint's error, above what is tolerated: a law differs in detail from the
-    real thing, and no other law is called for by that.
+    Of a set that has explained nearly all of the error of a joint at which it acts, above what is tolerated: a law
+    differs in detail from the real thing, and no other law is called for by that.
     """
     criteria, before = search.criteria, joint_errors(search.problem, search.base.fit.residual)
     errors = joint_errors(search.problem, one.residual)
-    detail = errors**2 - 1.0 <= (1.0 - criteria.nearly_whole) * (before**2 - 1.0)
+    acts = np.isin(search.fitted.joints, [term.joint for term in one.model.terms[len(search.start.terms) :]])
+    detail = acts & (errors**2 - 1.0 <= (1.0 - criteria.nearly_whole) * (before**2 - 1.0))
     return [int(j) for j in np.flatnonzero(errors > np.where(detail, criteria.tolerated, criteria.floor))]
 
 
 def look(search: Search, parent: Proposal, at: Sequence[str]) -> Looks:
     """Every law at these joints that promises something gets its own steps beside a set that is fitted."""
-    problem = Problem(search.shooting, some(search.all_windows, search.segments // LOOKED_AT))
+    problem = Problem(search.shooting, telling(search, parent.fit))
     problem.linearise_starts(parent.fit.model)
     frozen = renewed(problem, parent.fit, *problem.columns(parent.fit.model, parent.fit.unknowns))
     there = named_by(parent.effects)
@@ -96,6 +99,19 @@ def look(search: Search, parent: Proposal, at: Sequence[str]) -> Looks:
     tried = sorted((stepped(problem, frozen, one) for one in best_starts(promising)), key=lambda pair: pair[1].cost)
     alike = fit(problem, frozen.model, (), STEPS, frozen)
     return Looks(parent, problem, frozen, alike, tried, scores)
+
+
+def telling(search: Search, fitted: Fit) -> Windows:
+    """Few windows of those that a set was fitted to: half of them where it fails most, half spread over all.
+
+    A law that acts in rare moments alone, as a limit does, shows nowhere else.
+    """
+    windows = search.problem.windows
+    wanted = -(-search.segments // (LOOKED_AT * windows.segments))
+    costs = search.problem.cost(fitted.residual).reshape(-1, windows.segments).sum(axis=1)
+    worst = np.argsort(-costs, kind="stable")[: wanted // 2]
+    others = np.setdiff1d(np.arange(len(costs)), worst)
+    return windows.take(np.sort(np.concatenate([worst, others[spread(windows.trial[others], wanted - len(worst))]])))
 
 
 def wanted(search: Search, problem: Problem, frozen: Fit) -> list[Candidate]:
@@ -127,18 +143,26 @@ def grown(search: Search, looks: Looks) -> list[Proposal]:
 
     Once one leaves nothing, only those are refitted too that their own steps have brought near it.
     """
-    by_name: dict[tuple[str, tuple[str, ...]], tuple[Candidate, Fit]] = {}
+    by_name: dict[tuple[str, tuple[str, ...]], Tried] = {}
     for candidate, fitted in looks.tried:
-        by_name.setdefault((candidate.effect.name, candidate.joints), (candidate, fitted))
+        name = candidate.effect.name, candidate.joints
+        by_name[name] = (*by_name.get(name, ()), (candidate, fitted))
     found: list[Proposal] = []
-    for one in list(by_name.values())[:SINGLES]:
-        if search.spent:
-            break
-        if not whole(search, found) or near(search, looks, one[1].cost, found):
-            found.append(refitted(search, looks, (one,)))
+    for forms in list(by_name.values())[:SINGLES]:
+        if not whole(search, found) or near(looks, forms[0][1].cost, found):
+            found += in_its_forms(search, looks, forms)
     if not whole(search, found):
-        found += [refitted(search, looks, laws) for laws in sets(looks, search.criteria)[:SETS] if not search.spent]
+        found += [refitted(search, looks, laws) for laws in sets(looks, search.criteria) if not search.spent]
     return sorted(found, key=lambda one: one.price(search.criteria))
+
+
+def in_its_forms(search: Search, looks: Looks, forms: Tried) -> list[Proposal]:
+    """A law in the form that promises most, and in the next one where a number of it ends at an edge."""
+    found: list[Proposal] = []
+    for law in forms:
+        if not search.spent and all(at_bound(one) for one in found):
+            found.append(refitted(search, looks, (law,)))
+    return found
 
 
 def whole(search: Search, found: Sequence[Proposal]) -> bool:
@@ -146,10 +170,9 @@ def whole(search: Search, found: Sequence[Proposal]) -> bool:
     return any(not off(search, one.fit) for one in found)
 
 
-def near(search: Search, looks: Looks, left: float, found: Sequence[Proposal]) -> bool:
-    """Whether what laws leave after their own steps, on few windows, has come near the best set."""
-    count = np.count_nonzero(looks.problem.weight)
-    return bool(left / count <= CLOSE * min(search.over_noise(one.fit) for one in found) ** 2)
+def near(looks: Looks, left: float, found: Sequence[Proposal]) -> bool:
+    """Whether what laws leave after their own steps has come near what the best set leaves in the same windows."""
+    return bool(left <= CLOSE * min(fit(looks.problem, one.fit.model, (), 0).cost for one in found))
 
 
 def explains_most(search: Search, looks: Looks, left: float) -> bool:
@@ -193,9 +216,9 @@ def detailed(search: Search, one: Proposal) -> Proposal | None:
 
 
 def sets(looks: Looks, criteria: Criteria) -> list[Tried]:
-    """Pairs of laws, and one law at several joints, by what trials that they were not sized by would leave.
+    """Pairs of laws, and one law at several joints, that would leave least, and the cheapest.
 
-    The cheapest come first, each in the form that would leave least.
+    What counts is what trials would be left with that a set was not sized by.
 
     What each law changes is known from its own fit; together they are sized by least squares, on all trials but one in
     turn, from products that were summed trial by trial. Source: Allen, The relationship between variable selection and
@@ -207,24 +230,29 @@ def sets(looks: Looks, criteria: Criteria) -> list[Tried]:
     gradient, gram = products(problem, looks.alike, [fitted for _, fitted in laws])
     expected = noise_inflation(problem, looks.alike.cost)
     alone = np.array([press(gradient[:, [k]], gram[:, [k]][:, :, [k]], expected) for k in range(len(laws))])
-    found = []
+    gains = []
     for rows in wanted_sets([candidate for candidate, _ in laws]):
         part = np.ix_(range(len(gram)), rows, rows)
         gained = press(gradient[:, rows], gram[part], expected)
         if gained > alone[rows].max():
-            found.append((looks.alike.cost - gained, tuple(laws[k] for k in rows)))
+            gains.append((gained, tuple(laws[k] for k in rows)))
     first: dict[frozenset[tuple[str, str]], tuple[float, Tried]] = {}
-    for left, together in sorted(found, key=lambda one: one[0]):
+    for gained, together in sorted(gains, key=lambda one: -one[0]):
         effects = [candidate for candidate, _ in together]
-        first.setdefault(named_by(effects), (priced(left, effects, criteria), together))
-    return [together for _, together in sorted(first.values(), key=lambda one: one[0])]
+        first.setdefault(named_by(effects), (priced(looks.alike.cost - gained, effects, criteria), together))
+    cheapest = sorted(first, key=lambda names: first[names][0])
+    return [first[names][1] for names in dict.fromkeys([*[*first][:LEAVE_LEAST], *cheapest[:CHEAPEST]])]
 
 
 def wanted_sets(laws: Sequence[Candidate]) -> Iterator[list[int]]:
-    """Places of laws that may act together: any two, and one law in one form at three joints and more."""
-    for pair in combinations(range(len(laws)), 2):
-        if named_by([laws[pair[0]]]) != named_by([laws[pair[1]]]):
-            yield list(pair)
+    """Places of laws that may act together: any two in their best forms, one law in one form at three joints and more.
+
+    The laws come best first.
+    """
+    best: dict[tuple[str, tuple[str, ...]], int] = {}
+    for place, law in enumerate(laws):
+        best.setdefault((law.effect.name, law.joints), place)
+    yield from (list(pair) for pair in combinations(best.values(), 2))
     yield from (places for places in of_a_kind(laws) if len(places) > 2)
 
 

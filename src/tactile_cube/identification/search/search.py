@@ -195,14 +195,19 @@ class Search:
 
 def some(windows: Windows, segments: int) -> Windows:
     """Windows of about so many segments, spread over trials and over the time within trials."""
-    by_trial = [np.flatnonzero(windows.trial == k) for k in np.unique(windows.trial)]
+    return windows.take(np.sort(spread(windows.trial, -(-segments // windows.segments))))
+
+
+def spread(trial: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    """Places of so many windows, spread over their trials and over the time within trials."""
+    by_trial = [np.flatnonzero(trial == k) for k in np.unique(trial)]
     order = [
         int(rows[(turn + k) % len(rows)])
-        for turn in range(max(len(rows) for rows in by_trial))
+        for turn in range(max((len(rows) for rows in by_trial), default=0))
         for k, rows in enumerate(by_trial)
         if turn < len(rows)
     ]
-    return windows.take(np.array(sorted(order[: -(-segments // windows.segments)])))
+    return np.array(order[:count], dtype=np.int64)
 
 
 def steady_rows(shooting: Shooting, model: Model, windows: Windows) -> int:
