@@ -108,3 +108,6 @@ def test_what_a_larger_set_proves_a_smaller_one_lacks() -> None:
     nearly = judged(1.5)
     assert not lacking(nearly, replace(nearly, costs=nearly.costs * 0.89)), "a law differs as much in detail"
     assert lacking(nearly, replace(nearly, costs=nearly.costs * 0.5 * scatter))
+    doubtful = replace(less, costs=less.costs * 0.89 * np.exp(0.3 * np.random.default_rng(0).normal(size=60)))
+    assert lacking(less, doubtful)
+    assert not lacking(less, doubtful, looked_at=60), "one of sixty laws does as much by chance"

@@ -125,13 +125,13 @@ def worse(other: Judgement, best: Judgement, criteria: Criteria = STANDARD) -> b
     return bool(difference.sum() > allowed and standing_out(likelihood(other, best), best) > criteria.band)
 
 
-def lacking(less: Judgement, more: Judgement, criteria: Criteria = STANDARD) -> bool:
-    """Whether held-out trials prove what one set has beyond another that it contains.
+def lacking(less: Judgement, more: Judgement, criteria: Criteria = STANDARD, looked_at: int = 1) -> bool:
+    """Whether held-out trials prove what one set has beyond another, one of so many effects that it might have.
 
-    It has to earn its price, beyond its scatter. Where the smaller set leaves no more than is tolerated it has to take
+    It has to earn its price, and to be no chance. Where the smaller set leaves no more than is tolerated it has to take
     more than a law may differ in detail from the real thing.
     """
-    earned = gain(less, more) > criteria.least_gain and standing_out(likelihood(less, more), more) > criteria.band
+    earned = gain(less, more) > criteria.least_gain and p_value(less, more) * looked_at <= criteria.significant
     return earned and (less.joint_errors.max() > criteria.tolerated or worse(less, more, criteria))
 
 

@@ -67,16 +67,18 @@ def simplest(found: Sequence[Explanation], criteria: Criteria = STANDARD) -> Exp
     return min(equal, key=lambda e: (len(named(e)), e.size, e.judgement.costs.sum()))
 
 
-def sound(found: Sequence[Explanation], criteria: Criteria = STANDARD) -> list[Explanation]:
-    """Explanations of which sets that differ from them by whole effects show none as missing and none as needless."""
-    return [
-        one
-        for one in found
-        if not any(named(one) < named(more) and lacking(one.judgement, more.judgement, criteria) for more in found)
-        and not any(
-            named(less) < named(one) and gain(less.judgement, one.judgement) < criteria.least_gain for less in found
-        )
-    ]
+def sound(found: Sequence[Explanation], criteria: Criteria = STANDARD, looked_at: int = 1) -> list[Explanation]:
+    """Explanations of which sets that differ from them by whole effects show none as missing and none as needless.
+
+    What is missing may be any of the effects that were looked at.
+    """
+
+    def refuted(one: Explanation, other: Explanation) -> bool:
+        if named(one) < named(other):
+            return lacking(one.judgement, other.judgement, criteria, looked_at)
+        return named(other) < named(one) and gain(other.judgement, one.judgement) < criteria.least_gain
+
+    return [one for one in found if not any(refuted(one, other) for other in found)]
 
 
 def contains(richer: Explanation, simple: Explanation) -> bool:

@@ -104,7 +104,7 @@ def find(search: Search) -> Findings:
         looked,
     )
     if first and (good := found.proven(search.criteria)):
-        chosen = simplest(sound(good, search.criteria), search.criteria)
+        chosen = simplest(sound(good, search.criteria, looked), search.criteria)
         search.stand(f"{chosen.label} ({chosen.error:.2f} x sensor noise on held-out trials)", "its possible twins")
         if nameable(chosen, base, search.criteria):
             others = tuple(search.explained(one, looked) for one in twins(search, chosen, first, found.judged))
