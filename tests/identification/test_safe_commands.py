@@ -229,3 +229,14 @@ def test_a_real_axis_of_95_kg_is_not_driven_out_of_its_range(tmp_path: Path) -> 
     reached = experiment.safety.reached
     assert -0.0325 < reached.low[0] < reached.high[0] < 0.2825
     assert reached.speed[0] < 0.45
+
+
+def test_a_number_of_which_the_data_say_nothing_stays_where_it_is(axis: Rivals) -> None:
+    fit = axis.fits["viscous_friction"]
+    silent = next(k for k, unknown in enumerate(fit.unknowns) if unknown.kind == "effect")
+    information = fit.information.copy()
+    information[silent], information[:, silent] = 0.0, 0.0
+    value = fit.model.terms[0].values["damping"]
+    ends = interval_ends(replace(fit, information=information))
+    assert all(model.terms[0].values["damping"] == value for model in ends)
+    assert all(np.isfinite(model.constants["static_friction"]).all() for model in ends)

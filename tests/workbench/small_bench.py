@@ -23,6 +23,6 @@ def partly_known(folder: Path) -> Recording:
     """The same on a shaking table, which no effect of the catalogue describes."""
     for trial in stribeck_recording(folder).trials:
         table = polars.read_parquet(folder / trial.file)
-        shaken = trial.position[:, 0] + 9e-3 * np.sin(44.0 * trial.time + 9.0 * trial.position[0, 0])
+        shaken = trial.position[:, 0] + 8e-3 * np.sin(44.0 * trial.time + 9.0 * trial.position[0, 0])
         table.with_columns(polars.Series("a.position", shaken)).write_parquet(folder / trial.file)
     return read_recording(folder)

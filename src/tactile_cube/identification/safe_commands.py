@@ -328,7 +328,9 @@ def interval_ends(fit: Fit) -> list[Model]:
     covariance, unknowns = covariance_of_numbers(fit)
     misfit = max(1.0, fit.cost / max(int(np.count_nonzero(fit.residual)), 1))
     width = NORMAL_95 * np.sqrt(misfit) * np.array([unknown.scale for unknown in unknowns])
-    shifts = width[:, None] * covariance / np.sqrt(np.diag(covariance))
+    deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    known = deviation > 0.0  # where the data say nothing about a number pinv leaves none, and it stays where it is
+    shifts = width[:, None] * np.divide(covariance, deviation, out=np.zeros_like(covariance), where=known)
     values = read_all(fit.model, unknowns)
     names = [(unknown.kind, unknown.key) for unknown in unknowns]
     together = [shifts[:, [one == name for one in names]].sum(axis=1) for name in dict.fromkeys(names)]
