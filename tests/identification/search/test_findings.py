@@ -11,7 +11,7 @@ from tactile_cube.identification.criteria import Criteria
 from tactile_cube.identification.search.candidates import Candidate
 from tactile_cube.identification.search.explanation import named_by
 from tactile_cube.identification.search.findings import find, together
-from tactile_cube.identification.search.proposals import press, telling
+from tactile_cube.identification.search.proposals import failing_windows, press
 from tactile_cube.identification.search.search import BestSoFar, Search
 from tactile_cube.identification.verdict import decide
 from tactile_cube.measurement.recordings.recording import Recording
@@ -81,7 +81,7 @@ def test_laws_are_tried_where_a_set_fails_most(heavier: Recording) -> None:
     for window in (1, len(windows) - 2):
         residual = np.zeros_like(search.base.fit.residual)
         residual[window * windows.segments] = np.linspace(-5.0, 5.0, residual.shape[1])
-        few = telling(search, replace(search.base.fit, residual=residual))
+        few = failing_windows(search, replace(search.base.fit, residual=residual))
         assert 0 < len(few) < len(windows)
         assert any(np.array_equal(one, windows.measured[window]) for one in few.measured)
 

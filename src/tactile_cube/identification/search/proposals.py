@@ -84,7 +84,7 @@ def off(search: Search, one: Fit) -> list[int]:
 
 def look(search: Search, parent: Proposal, at: Sequence[str]) -> Looks:
     """Every law at these joints that promises something gets its own steps beside a set that is fitted."""
-    problem = Problem(search.shooting, telling(search, parent.fit))
+    problem = Problem(search.shooting, failing_windows(search, parent.fit))
     problem.linearise_starts(parent.fit.model)
     frozen = renewed(problem, parent.fit, *problem.columns(parent.fit.model, parent.fit.unknowns))
     there = named_by(parent.effects)
@@ -101,7 +101,7 @@ def look(search: Search, parent: Proposal, at: Sequence[str]) -> Looks:
     return Looks(parent, problem, frozen, alike, tried, scores)
 
 
-def telling(search: Search, fitted: Fit) -> Windows:
+def failing_windows(search: Search, fitted: Fit) -> Windows:
     """Few windows of those that a set was fitted to: half of them where it fails most, half spread over all.
 
     A law that acts in rare moments alone, as a limit does, shows nowhere else.
