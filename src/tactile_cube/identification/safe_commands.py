@@ -324,12 +324,13 @@ def interval_ends(fit: Fit) -> list[Model]:
     """Models with each number at either end of its 95 % interval, the others refitted to that.
 
     A number of one kind is at its end at all joints at once, so that a hand needs no more models than a joint.
+    One of which the data say nothing stays as fitted: it has no end that could be tried.
     """
     covariance, unknowns = covariance_of_numbers(fit)
     misfit = max(1.0, fit.cost / max(int(np.count_nonzero(fit.residual)), 1))
     width = NORMAL_95 * np.sqrt(misfit) * np.array([unknown.scale for unknown in unknowns])
     deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    known = deviation > 0.0  # where the data say nothing about a number pinv leaves none, and it stays where it is
+    known = deviation > 0.0  # pinv leaves none where the data say nothing
     shifts = width[:, None] * np.divide(covariance, deviation, out=np.zeros_like(covariance), where=known)
     values = read_all(fit.model, unknowns)
     names = [(unknown.kind, unknown.key) for unknown in unknowns]

@@ -149,7 +149,7 @@ def priced(cost: float, effects: Sequence[Candidate], criteria: Criteria) -> flo
 
 
 def at_bound(one: Explanation | Proposal) -> bool:
-    """Whether a number of its effects ends at the edge of what such a number may be.
+    """Whether a number of its effects ends at its lower or upper bound.
 
     Then the law stands in for another one: so do waves longer than the range of motion for any bent curve.
     """
