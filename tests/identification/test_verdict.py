@@ -191,6 +191,17 @@ def test_a_set_is_refused_to_which_another_adds_what_is_proven() -> None:
     less, more = explanation("torque_saturation", 10.0), explanation("torque_saturation", 9.0)
     other = explanation("command_delay", 10.0)
     more = replace(more, effects=(*more.effects, *explanation("torque_gain", 9.0).effects))
-    assert sound([less, more, other]) == [more, other], "what it adds to is refused, another law is not"
+    base = findings(20.0).base
+    assert sound([less, more, other], base) == [more, other], "what it adds to is refused, another law is not"
     useless = replace(more, judgement=judged(10.5))
-    assert sound([less, useless, other]) == [less, other], "as is a set that does no better without one of its effects"
+    assert sound([less, useless, other], base) == [less, other], "as is a set that does no better without one effect"
+
+
+@pytest.mark.parametrize(("left", "named"), [(4.0, 1), (2.0, 2)])
+def test_what_comes_to_a_set_that_is_complete_has_to_take_away_most_of_the_rest(left: float, named: int) -> None:
+    """Of what a law in another form leaves many others take a part."""
+    alone, more = explanation("torque_saturation", 9.0, 90.0), explanation("torque_saturation", left, 90.0)
+    both = replace(more, effects=(*more.effects, *explanation("torque_gain", left).effects))
+    verdict = decide(findings(90.0, alone, both))
+    assert len(verdict.chosen.effects) == named
+    assert verdict.kind == ("partly_explained" if named == 1 else "missing_effect")

@@ -48,7 +48,7 @@ def decide(findings: Findings, criteria: Criteria = STANDARD) -> Verdict:
     base = findings.base
     found = findings.kept(criteria)
     likely = [one for one in findings.proven(criteria) if not at_bound(one)]
-    possible = sound(likely, criteria, findings.looked)
+    possible = sound(likely, base, criteria, findings.looked)
     plausible = [one for one in possible if any(one is other for other in found)]
     if not found:
         small = base.largest_error <= criteria.adequate

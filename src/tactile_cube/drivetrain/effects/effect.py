@@ -238,6 +238,7 @@ class Effect:
     Empty: one form, all parameters at their typical values.
     """
     details: ClassVar[tuple[str, ...]] = ()  # parameters that a search frees last, where a form fits the data already
+    detail_starts: ClassVar[Mapping[str, float]] = {}  # where it begins those that do little near their neutral values
     contains: ClassVar[Simpler] = {}
     """Simpler effects that are special cases of this one, and the parameters' values at which it becomes each of them.
 

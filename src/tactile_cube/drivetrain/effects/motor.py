@@ -254,6 +254,7 @@ class TorqueSaturation(Effect):
         ),
     )
     details = ("softness",)
+    detail_starts: ClassVar[Mapping[str, float]] = {"softness": 0.3}
 
     @classmethod
     def starts_at(cls, scales: Scales) -> list[dict[str, float]]:

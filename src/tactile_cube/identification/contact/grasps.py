@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.model_file import ModelFile
-from tactile_cube.identification.fitting.problem import RUN_AWAY, Problem
+from tactile_cube.identification.fitting.problem import RUN_AWAY, STEP, Problem
 from tactile_cube.identification.fitting.unknowns import Unknown
 from tactile_cube.identification.search.evidence import Judgement
 from tactile_cube.measurement.bench import with_object
@@ -43,7 +43,6 @@ ITERATIONS = 4  # steps with slopes that each step corrects
 SHARES = (1.0, 0.3)  # of a step that are tried
 ENOUGH = 0.05  # share of the misfit that a further step must take off
 MOVED = 1e-3  # [rad] a finger whose commands move less takes no part, so that nobody need know its offsets
-SECANT = 0.2  # of an unknown's scale to either side: initialisations differ as much in when something slips
 FITTED, JUDGED = 3, 2  # trials of each kind that are fitted and judged by in a search
 
 
@@ -139,6 +138,8 @@ class Grasps(Problem):
     that a load which falls in one simulation alone does not decide.
     """
 
+    finest = STEP  # initialisations differ by more in when something slips
+
     def __init__(self, grasps: Sequence[Grasp]) -> None:
         """Simulates nothing yet; other problems may have the same grasps."""
         self.grasps = list(grasps)
@@ -174,14 +175,14 @@ class Grasps(Problem):
         """Residuals or columns with the weight of their segments; what nobody knows of a grasp is in the residual."""
         return np.asarray(x * self._trust.reshape(-1, *[1] * (x.ndim - 1)))
 
-    def columns(self, model: Model, unknowns: Sequence[Unknown]) -> tuple[Array, Array]:
+    def columns(self, model: Model, unknowns: Sequence[Unknown], step: float = STEP) -> tuple[Array, Array]:
         """Prediction (G, R), and wide secants (G, R, P), weighted, per unit of each unknown's scale.
 
         How far two slips are apart in time has a corner where they coincide: a secant over it leads to their mean.
         """
         found = []
         for unknown in unknowns:
-            value, width = unknown.of(model), SECANT * unknown.scale
+            value, width = unknown.of(model), step * unknown.scale
             low, high = max(value - width, unknown.low), min(value + width, unknown.high)
             less, more = (self.prediction(unknown.put(model, one)) for one in (low, high))
             found.append(self.limited(more - less) * self.weight * unknown.scale / (high - low))

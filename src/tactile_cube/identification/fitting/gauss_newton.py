@@ -6,13 +6,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.identification.fitting.problem import Problem
+from tactile_cube.identification.fitting.problem import STEP, Problem
 from tactile_cube.identification.fitting.unknowns import Unknown, put_all, read_all
 from tactile_cube.measurement.comparing.error import CORRELATED
 from tactile_cube.measurement.replay.model import Model
 
 Array = NDArray[np.float64]
 DAMPING = 1e-4  # of a first step, in units of the information
+POOR = 1.0  # damping, as large as the information, from which on a fit that stops takes its derivatives anew, finer
 CONVERGED = 2e-3  # relative gain below which a fit ends that only has to be compared with others
 SHORTER = (
     6  # shorter and shorter steps that are tried before a fit ends; each costs one simulation, derivatives cost many
@@ -61,28 +62,29 @@ def fit(
         converged: relative gain of a step, made or promised, below which the fit ends.
     """
     everything = (*(frozen.unknowns if frozen else ()), *unknowns)
-    best = _linearised(problem, model, unknowns, everything, frozen)
+    step = STEP
+    best = _linearised(problem, model, unknowns, everything, frozen, step)
     damping = DAMPING
     for iteration in range(iterations):
         weight = noise_inflation(problem, best.cost)
-        reached = best.cost + weight * best.prior_penalty
+        reached, gain = best.cost + weight * best.prior_penalty, 0.0
         for _ in range(SHORTER):
             stepped, promised = _stepped(problem, best, weight, damping)
             if promised < converged * reached:
-                return best
+                break
             tried = _evaluated(problem, best, stepped)
-            if tried.cost + weight * tried.prior_penalty < reached:
+            left = tried.cost + weight * tried.prior_penalty
+            if left < reached:
+                best, gain = tried, (reached - left) / max(reached, 1e-9)
                 break
             damping *= 10.0
-        else:
-            return best
-        gain = (reached - tried.cost - weight * tried.prior_penalty) / max(reached, 1e-9)
-        damping *= 0.3
-        best = tried
+        shortened, damping = damping >= POOR, 0.3 * damping
         if gain < converged:
-            break
+            if not shortened or step == problem.finest or not unknowns:
+                break
+            step, damping = problem.finest, DAMPING
         if unknowns and iteration < iterations - 1:
-            best = _linearised(problem, best.model, unknowns, everything, frozen)
+            best = _linearised(problem, best.model, unknowns, everything, frozen, step)
     return best
 
 
@@ -92,9 +94,10 @@ def _linearised(
     unknowns: Sequence[Unknown],
     everything: tuple[Unknown, ...],
     frozen: Fit | None,
+    step: float,
 ) -> Fit:
     """A model with its derivatives, which are neighbours along its path."""
-    prediction, fresh = problem.columns(model, unknowns)
+    prediction, fresh = problem.columns(model, unknowns, step)
     residual = problem.residual(prediction)
     columns = np.concatenate([frozen.columns, fresh], axis=-1) if frozen else fresh
     cost = float(problem.cost(residual).sum())

@@ -88,7 +88,8 @@ START_POSITION = 1e-3  # [rad] of a finger, as all sizes here: how well a segmen
 START_SPEED_PER_ACCELERATION = 0.01  # [s]
 RUN_AWAY = 1.0  # [rad] as far off as this counts a simulation that ran away
 WOUND, REWOUND = 0.1, 2  # [N m] what an integral may hold beyond balance; Gauss-Newton steps that find it
-STEP = 0.2  # finite differences, in units of an unknown's scale
+STEP = 0.2  # finite differences, in units of an unknown's scale: wide enough to bridge what sticks for a moment
+FINE = 0.02  # the same where a step by those found no descent: they are secants, and may point the wrong way
 
 
 class Problem:
@@ -97,6 +98,8 @@ class Problem:
     Each segment's start is a nuisance with a Gaussian prior. `free(x)` multiplies by the inverse covariance that is
     left when it is integrated out, so `sum(x * free(y))` is the inner product of the marginal likelihood.
     """
+
+    finest = FINE
 
     def __init__(self, shooting: Shooting, windows: Windows) -> None:
         self.shooting = shooting
@@ -192,16 +195,16 @@ class Problem:
         """Marginal squared error of each segment (G,), in units of the sensor's variance."""
         return np.asarray(np.sum(residual * self.free(residual), axis=1))
 
-    def columns(self, model: Model, unknowns: Sequence[Unknown]) -> tuple[Array, Array]:
+    def columns(self, model: Model, unknowns: Sequence[Unknown], step: float = STEP) -> tuple[Array, Array]:
         """Prediction (G, R) of a model and its derivatives (G, R, P), weighted, per unit of each unknown's scale."""
         base = self.prediction(model)
         if not unknowns:
             return base, np.zeros((*base.shape, 0))
-        moved = [moved_model(model, unknown) for unknown in _simulated(unknowns)]
+        moved = [moved_model(model, unknown, step) for unknown in _simulated(unknowns)]
         predictions = self.predictions([one for one, _ in moved], model)
         found = {
-            _key(unknown): (np.clip(p - base, -self.run_away, self.run_away) / step * self.weight)
-            for unknown, p, (_, step) in zip(_simulated(unknowns), predictions, moved, strict=True)
+            _key(unknown): (np.clip(p - base, -self.run_away, self.run_away) / width * self.weight)
+            for unknown, p, (_, width) in zip(_simulated(unknowns), predictions, moved, strict=True)
         }
         columns = [self._masked(found[_key(unknown)], unknown) for unknown in unknowns]
         return base, np.nan_to_num(np.stack(columns, axis=-1))
@@ -221,12 +224,12 @@ def _simulated(unknowns: Sequence[Unknown]) -> list[Unknown]:
     return list({_key(unknown): unknown for unknown in unknowns}.values())
 
 
-def moved_model(model: Model, unknown: Unknown) -> tuple[Model, float]:
+def moved_model(model: Model, unknown: Unknown, part: float = STEP) -> tuple[Model, float]:
     """The model with an unknown moved by a finite step within its bounds, and the step in units of its scale."""
-    step = STEP * unknown.scale
+    step = part * unknown.scale
     if unknown.kind == "offset":
         moved = {key: value + step * (np.arange(len(value)) == unknown.place) for key, value in model.offsets.items()}
-        return Model(model.constants, model.terms, moved), STEP
+        return Model(model.constants, model.terms, moved), part
     value = unknown.of(model)
     step = step if value + step <= unknown.high else -step
     if value + step < unknown.low:

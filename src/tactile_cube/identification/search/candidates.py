@@ -132,7 +132,8 @@ def with_details(candidate: Candidate, model: Model) -> tuple[Candidate, Model, 
     if not details:
         return None
     neutral = {name: p.neutral for name, p in candidate.parameters(candidate.joints[0]).items() if name in details}
-    terms = [replace(term, fitted=(*term.fitted, *details)) for term in model.terms[first:]]
+    begun = {name: start for name, start in candidate.effect.detail_starts.items() if name in details}
+    terms = [replace(t, values={**t.values, **begun}, fitted=(*t.fitted, *details)) for t in model.terms[first:]]
     unknowns = [u for k, term in enumerate(terms) for u in term_unknowns(term, first + k, candidate.sizes)]
     detailed = replace(candidate, form={**candidate.form, **neutral})
     return detailed, replace(model, terms=(*model.terms[:first], *terms)), tuple(unknowns)

@@ -67,16 +67,25 @@ def simplest(found: Sequence[Explanation], criteria: Criteria = STANDARD) -> Exp
     return min(equal, key=lambda e: (len(named(e)), e.size, e.judgement.costs.sum()))
 
 
-def sound(found: Sequence[Explanation], criteria: Criteria = STANDARD, looked_at: int = 1) -> list[Explanation]:
+def sound(
+    found: Sequence[Explanation], base: Explanation, criteria: Criteria = STANDARD, looked_at: int = 1
+) -> list[Explanation]:
     """Explanations of which sets that differ from them by whole effects show none as missing and none as needless.
 
-    What is missing may be any of the effects that were looked at.
+    What is missing may be any of the effects that were looked at. Where a set is complete, what comes to it has to take
+    away most of the rest, as a law that is there does: laws that differ from the real thing in detail leave a rest of
+    which others take a part.
     """
 
     def refuted(one: Explanation, other: Explanation) -> bool:
         if named(one) < named(other):
-            return lacking(one.judgement, other.judgement, criteria, looked_at)
-        return named(other) < named(one) and gain(other.judgement, one.judgement) < criteria.least_gain
+            return lacking(one.judgement, other.judgement, criteria, looked_at) and not in_detail(other, one)
+        if named(other) < named(one):
+            return gain(other.judgement, one.judgement) < criteria.least_gain or in_detail(one, other)
+        return False
+
+    def in_detail(more: Explanation, less: Explanation) -> bool:
+        return complete(less, base, criteria) and more.explained(less) < criteria.most
 
     return [one for one in found if not any(refuted(one, other) for other in found)]
 

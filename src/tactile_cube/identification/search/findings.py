@@ -18,6 +18,7 @@ from tactile_cube.identification.search.explanation import (
     Explanation,
     Proposal,
     nameable,
+    named,
     named_by,
     proven,
     simplest,
@@ -45,7 +46,7 @@ from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model, Term
 
 MOST = 4  # laws in a set, each at all joints that need it
-JUDGED = 6  # sets that the held-out trials judge, and as many more of what may stand for one of the chosen effects
+JUDGED = 6  # sets that the held-out trials judge in any case, and most of what may stand for one of the chosen effects
 
 
 @dataclass(frozen=True)
@@ -69,10 +70,23 @@ class Findings:
     stopped: str = ""
 
     def proven(self, criteria: Criteria = STANDARD) -> list[Explanation]:
-        """Sets that are no chance, best first; none beside a base model at the floor but a shared offset."""
+        """Sets that are no chance, best first; none beside a base model at the floor but a shared offset.
+
+        Once one of them proves that something is missing, another set of as few effects that does better is no chance
+        either, however few blocks there are to show that it is none.
+        """
         found = [one for one in self.judged if proven(one, criteria)]
         if self.base.largest_error <= criteria.floor:
             found = [one for one in found if one.judgement is self.base.judgement]
+        elif found:
+            best = min(found, key=lambda one: one.judgement.costs.sum())
+            found += [
+                one
+                for one in self.judged
+                if not proven(one, criteria)
+                and one.judgement.costs.sum() < best.judgement.costs.sum()
+                and len(named(one)) <= len(named(best))
+            ]
         return sorted(found, key=lambda one: one.judgement.costs.sum())
 
     def kept(self, criteria: Criteria = STANDARD) -> list[Explanation]:
@@ -99,12 +113,12 @@ def find(search: Search) -> Findings:
     found = Findings(
         base,
         nominal,
-        tuple(search.explained(one, looked) for one in cheapest(way, search)[:JUDGED]),
+        tuple(search.explained(one, looked) for one in to_be_judged(way, search)),
         tuple(first.scores) if first else (),
         looked,
     )
     if first and (good := found.proven(search.criteria)):
-        chosen = simplest(sound(good, search.criteria, looked), search.criteria)
+        chosen = simplest(sound(good, base, search.criteria, looked), search.criteria)
         search.stand(f"{chosen.label} ({chosen.error:.2f} x sensor noise on held-out trials)", "its possible twins")
         if nameable(chosen, base, search.criteria):
             others = tuple(search.explained(one, looked) for one in twins(search, chosen, first, found.judged))
@@ -127,14 +141,13 @@ def proposed(search: Search) -> tuple[list[Proposal], Looks | None]:
             break
         search.say(f"{len(looks.scores)} starts of {looks.laws} laws beside {parent.label}")
         tried = [one for one in grown(search, looks) if laws_of(one) <= MOST]
-        details = [one for one in tried if one is tried[0] or len(one.effects) == len(parent.effects) + 1]
-        tried += [richer for richer in (detailed(search, one) for one in details) if richer]
-        tried.sort(key=lambda one: one.price(search.criteria))
+        if tried and len(tried[0].effects) > len(parent.effects) + 1 and (richer := detailed(search, tried[0])):
+            tried = sorted([*tried, richer], key=lambda one: one.price(search.criteria))
         found += tried
         if not tried or tried[0].price(search.criteria) >= parent.price(search.criteria):
             break
         before, parent = parent, tried[0]
-        if out_of_reach(search, before, parent):
+        if out_of_reach(search, before, parent) or in_detail(search, before, parent):
             break
         search.say.following = "one effect more, and each one taken out"
     return [*found, *reduced(search, parent)], first
@@ -150,6 +163,17 @@ def out_of_reach(search: Search, before: Proposal, one: Proposal) -> bool:
     left = one.fit.cost - (MOST - laws_of(one)) * taken - rows
     enough = max((1.0 - criteria.most) * (search.base.fit.cost - rows), (criteria.tolerated**2 - 1.0) * rows)
     return bool(left > enough)
+
+
+def in_detail(search: Search, before: Proposal, one: Proposal) -> bool:
+    """Whether a set had explained nearly the whole, and what came to it has not taken away most of the rest.
+
+    Then the rest is what its laws differ by from the real thing, and further laws take a part of it again.
+    """
+    criteria, rows = search.criteria, np.count_nonzero(search.problem.weight)
+    rest = before.fit.cost - rows
+    nearly_whole = rest <= (1.0 - criteria.nearly_whole) * (search.base.fit.cost - rows)
+    return bool(nearly_whole and before.fit.cost - one.fit.cost < criteria.most * rest)
 
 
 def laws_of(one: Proposal) -> int:
@@ -175,12 +199,15 @@ def together(effects: Sequence[Candidate]) -> list[list[int]]:
     return [[place for place, name in enumerate(names) if name == law] for law in dict.fromkeys(names)]
 
 
-def cheapest(found: Sequence[Proposal], search: Search) -> list[Proposal]:
-    """The cheapest of those that name the same effects, cheapest first."""
-    first: dict[frozenset[tuple[str, str]], Proposal] = {}
+def to_be_judged(found: Sequence[Proposal], search: Search) -> list[Proposal]:
+    """The cheapest of those that name the same effects, cheapest first: some, and the first of every number of laws."""
+    cheapest: dict[frozenset[tuple[str, str]], Proposal] = {}
     for one in sorted(found, key=lambda one: one.price(search.criteria)):
-        first.setdefault(named_by(one.effects), one)
-    return list(first.values())
+        cheapest.setdefault(named_by(one.effects), one)
+    sets, first = list(cheapest.values()), dict[int, int]()
+    for place, one in enumerate(sets):
+        first.setdefault(laws_of(one), place)
+    return [sets[place] for place in sorted({*range(min(JUDGED, len(sets))), *first.values()})]
 
 
 def twins(search: Search, chosen: Explanation, first: Looks, judged: Sequence[Explanation]) -> list[Proposal]:
@@ -215,7 +242,7 @@ def twins(search: Search, chosen: Explanation, first: Looks, judged: Sequence[Ex
                 continue
             known.add(names)
             if not near(looks, left_by(looks, one), [itself]):
-                one = tuple((law, further(looks, fitted)) for law, fitted in one)
+                one = tuple(further(looks, law, fitted) for law, fitted in one)
             if one[0][0].effect.name in simpler or near(looks, left_by(looks, one), [itself]):
                 found.append(refitted(search, looks, one))
     return [one for one in found if one.fit.cost <= CLOSE * chosen.fit.cost]
@@ -230,7 +257,10 @@ def instead(looks: Looks, replaced: Sequence[Candidate]) -> list[Tried]:
 
 
 def simpler_laws(search: Search, chosen: Explanation, place: int) -> set[str]:
-    """Effects that one of a set may just as well be: at a value that its interval reaches it becomes them."""
+    """Effects that one of a set may just as well be: what it becomes at a value that its interval reaches.
+
+    A table may be any of its special shapes.
+    """
     fitted = search.frozen(chosen.fit)
     first = first_term(fitted.model, chosen.effects, place)
     width = NORMAL_95 * standard_errors(search.problem, fitted)
@@ -242,8 +272,7 @@ def simpler_laws(search: Search, chosen: Explanation, place: int) -> set[str]:
     return {
         name
         for name, values in chosen.effects[place].effect.contains.items()
-        for key, value, half, high in reach
-        if key in values and abs(min(values[key], high) - value) <= half
+        if not values or any(k in values and abs(min(values[k], high) - at) <= half for k, at, half, high in reach)
     }
 
 

@@ -70,16 +70,8 @@ class Looks:
 
 
 def off(search: Search, one: Fit) -> list[int]:
-    """Joints whose error on the fitted trials is above the floor, the whole machine's included.
-
-    Of a set that has explained nearly all of the error of a joint at which it acts, above what is tolerated: a law
-    differs in detail from the real thing, and no other law is called for by that.
-    """
-    criteria, before = search.criteria, joint_errors(search.problem, search.base.fit.residual)
-    errors = joint_errors(search.problem, one.residual)
-    acts = np.isin(search.fitted.joints, [term.joint for term in one.model.terms[len(search.start.terms) :]])
-    detail = acts & (errors**2 - 1.0 <= (1.0 - criteria.nearly_whole) * (before**2 - 1.0))
-    return [int(j) for j in np.flatnonzero(errors > np.where(detail, criteria.tolerated, criteria.floor))]
+    """Joints whose error on the fitted trials is above the floor, the whole machine's included."""
+    return [int(j) for j in np.flatnonzero(joint_errors(search.problem, one.residual) > search.criteria.floor)]
 
 
 def look(search: Search, parent: Proposal, at: Sequence[str]) -> Looks:
@@ -157,11 +149,15 @@ def grown(search: Search, looks: Looks) -> list[Proposal]:
 
 
 def in_its_forms(search: Search, looks: Looks, forms: Tried) -> list[Proposal]:
-    """A law in the form that promises most, and in the next one where a number of it ends at an edge."""
+    """A law in the form that promises most, plain and with its details free.
+
+    In the next form too where a number of it ends at an edge.
+    """
     found: list[Proposal] = []
     for law in forms:
         if not search.spent and all(at_bound(one) for one in found):
-            found.append(refitted(search, looks, (law,)))
+            one = refitted(search, looks, (law,))
+            found += [one, *(richer for richer in [detailed(search, one)] if richer)]
     return found
 
 
@@ -187,10 +183,11 @@ def left_by(looks: Looks, laws: Tried) -> float:
     return laws[0][1].cost - sum(looks.alike.cost - fitted.cost for _, fitted in laws[1:])
 
 
-def further(looks: Looks, fitted: Fit) -> Fit:
-    """A law after more steps of its own: a twin is as good only once the constants beside it have moved."""
+def further(looks: Looks, candidate: Candidate, fitted: Fit) -> tuple[Candidate, Fit]:
+    """A law after more steps of its own, its details free: a twin is as good only once what is beside it has moved."""
     own = fitted.unknowns[len(looks.frozen.unknowns) :]
-    return fit(looks.problem, fitted.model, own, MORE_STEPS, looks.frozen)
+    detailed, model, unknowns = with_details(candidate, fitted.model) or (candidate, fitted.model, own)
+    return detailed, fit(looks.problem, model, unknowns, MORE_STEPS, looks.frozen)
 
 
 def refitted(search: Search, looks: Looks, laws: Tried) -> Proposal:
@@ -199,6 +196,11 @@ def refitted(search: Search, looks: Looks, laws: Tried) -> Proposal:
     terms = [term for _, fitted in laws for term in fitted.model.terms[known:]]
     model = replace(looks.frozen.model, terms=(*looks.frozen.model.terms, *terms))
     one = Proposal((*looks.parent.effects, *(candidate for candidate, _ in laws)), search.refitted(model))
+    return noted(search, one)
+
+
+def noted(search: Search, one: Proposal) -> Proposal:
+    """A set, once it has been said, and that it is the best one so far if it is."""
     left = search.over_noise(one.fit)
     if left < search.least:
         search.least = left
@@ -209,10 +211,10 @@ def refitted(search: Search, looks: Looks, laws: Tried) -> Proposal:
 
 def detailed(search: Search, one: Proposal) -> Proposal | None:
     """A set with the details of its last law free too, if it has any."""
-    if not one.effects or not (richer := with_details(one.effects[-1], one.fit.model)):
+    if not (richer := with_details(one.effects[-1], one.fit.model)):
         return None
     candidate, model, _ = richer
-    return Proposal((*one.effects[:-1], candidate), search.refitted(model))
+    return noted(search, Proposal((*one.effects[:-1], candidate), search.refitted(model)))
 
 
 def sets(looks: Looks, criteria: Criteria) -> list[Tried]:
