@@ -44,7 +44,7 @@ class Verdict:
 
 
 def decide(findings: Findings, criteria: Criteria = STANDARD) -> Verdict:
-    """The answer to what a search has found."""
+    """Return the verdict on the results of a search."""
     base = findings.base
     found = findings.kept(criteria)
     likely = [one for one in findings.proven(criteria) if not at_bound(one)]

@@ -123,7 +123,7 @@ def candidates(sizes: Sizes, effects: Sequence[EffectClass]) -> list[Candidate]:
 def with_details(candidate: Candidate, model: Model) -> tuple[Candidate, Model, tuple[Unknown, ...]] | None:
     """The last effect of a fitted model with the details of its law free too: as candidate, model and unknowns.
 
-    None for a law of which the recording can tell no details that are not fitted already.
+    None for a law that has no identifiable details beyond those fitted already.
     """
     first = len(model.terms) - len(candidate.joints)
     scales = candidate.sizes.get(candidate.joints[0], FINGER)

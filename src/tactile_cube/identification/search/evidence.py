@@ -1,4 +1,4 @@
-"""Judging fitted models on trials that the fit never saw."""
+"""Comparison of fitted models on held-out trials."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model
 
 Array = NDArray[np.float64]
-FEWEST_BLOCKS = 5  # that a scatter is told from
+FEWEST_BLOCKS = 5  # for an estimate of their scatter
 SLIGHT = 1.0  # [sensor variance] what a number that follows noise alone gains in a segment, in the mean
 FEWEST_PAIRS = 10  # of segments so far apart, that an autocorrelation needs
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """How a model does on held-out segments.
+    """Error of a model on held-out segments.
 
     Attributes:
         model: with the joint offsets of the held-out initialisations.
@@ -54,7 +54,7 @@ class Judgement:
 
 
 def judge(problem: Problem, held_out: Recording, model: Model) -> Judgement:
-    """Error of a model on held-out segments; only the joint offsets of unseen initialisations are fitted there."""
+    """Return the error of a model on held-out segments; only joint offsets of unseen initialisations are fitted."""
     fitted = fit(problem, model, offset_unknowns(held_out, problem.shooting.sizes), iterations=3)
     samples = np.count_nonzero(problem.weight, axis=1)
     costs = charged(problem.cost(fitted.residual), samples, problem.chosen_numbers(fitted.model))
@@ -66,10 +66,10 @@ def judge(problem: Problem, held_out: Recording, model: Model) -> Judgement:
 
 
 def charged(costs: Array, samples: NDArray[np.int64], numbers: NDArray[np.int64]) -> Array:
-    """Squared errors (G,) with a charge for numbers (G,) of a segment's start that were chosen by the segment itself.
+    """Return squared errors (G,) corrected for initial-state parameters (G,) that were fitted to the segment itself.
 
-    Generalised cross-validation: of n independent numbers k choose, so what is left counts (n / (n - k))^2 times. What
-    is above the noise remembers itself, so that few of its samples are independent; what is noise is charged nothing.
+    Generalised cross-validation: with k of n independent numbers fitted, the excess over the noise counts
+    (n / (n - k))^2 times. It is autocorrelated, so few of its samples are independent.
     Source: Golub, Heath, Wahba, Technometrics 21, 1979.
     """
     independent = np.maximum(samples / CORRELATED, numbers + 1.0)
@@ -78,24 +78,24 @@ def charged(costs: Array, samples: NDArray[np.int64], numbers: NDArray[np.int64]
 
 
 def joint_squares(problem: Problem, residual: Array) -> Array:
-    """Squared residuals (n,) of each joint's sensors, in units of the noise, with the starts of segments taken out."""
+    """Return squared residuals (n,) of each joint in units of the noise, initial states projected out."""
     return np.asarray(np.maximum(_joint_squares(problem, residual)[0].sum(axis=0), 0.0))
 
 
 def joint_errors(problem: Problem, residual: Array) -> Array:
-    """RMS (n,) of the residual of each joint's sensors with the starts of segments taken out."""
+    """Return RMS residuals (n,) of each joint in units of the noise, initial states projected out."""
     squares, present = _joint_squares(problem, residual)
     return np.asarray(np.sqrt(np.maximum(squares.sum(axis=0), 0.0) / np.maximum(present.sum(axis=0), 1)))
 
 
 def segment_errors(problem: Problem, residual: Array) -> Array:
-    """The same of each segment, (G, n); nan where nothing was measured."""
+    """Return the same for each segment (G, n); nan where nothing was measured."""
     squares, present = _joint_squares(problem, residual)
     return np.asarray(np.sqrt(np.maximum(squares, 0.0) / np.where(present > 0, present, np.nan)))
 
 
 def _joint_squares(problem: Problem, residual: Array) -> tuple[Array, NDArray[np.int64]]:
-    """Squared residuals (G, n) with the starts taken out, and how many numbers were measured."""
+    """Return squared residuals (G, n), initial states projected out, and the number of samples."""
     joint_of = problem.windows.joint_of
     shape = (len(residual), -1, len(joint_of))
     present = np.count_nonzero(problem.weight.reshape(shape), axis=1)
@@ -108,16 +108,15 @@ def _joint_squares(problem: Problem, residual: Array) -> tuple[Array, NDArray[np
 
 
 def gain(before: Judgement, after: Judgement) -> float:
-    """Share of the squared error that the second model takes away."""
+    """Return the share of the squared error that the second model removes."""
     return float(1.0 - after.costs.sum() / before.costs.sum())
 
 
 def worse(other: Judgement, best: Judgement, criteria: Criteria = STANDARD) -> bool:
-    """Whether the held-out trials speak against `other`.
+    """Return whether the held-out trials reject `other` in favour of the best model.
 
-    The difference has to stand out of its scatter from block to block, and to be more than a law gains by chance beside
-    slightly wrong constants, and more than a part of what the better model leaves unexplained itself: that much a law
-    may differ in detail from the real thing.
+    The difference has to exceed `band` standard deviations from block to block, the gain of a law by chance beside
+    slightly wrong constants, and a part (`detail`) of what the better model leaves unexplained itself.
     """
     difference = other.costs - best.costs
     unexplained = max(float(best.costs.sum() - best.samples.sum()), 0.0)
@@ -126,26 +125,25 @@ def worse(other: Judgement, best: Judgement, criteria: Criteria = STANDARD) -> b
 
 
 def lacking(less: Judgement, more: Judgement, criteria: Criteria = STANDARD, looked_at: int = 1) -> bool:
-    """Whether held-out trials prove what one set has beyond another, one of so many effects that it might have.
+    """Return whether a set is significantly better than a subset, corrected for the number of laws screened.
 
-    It has to earn its price, and to be no chance. Where the smaller set leaves no more than is tolerated it has to take
-    more than a law may differ in detail from the real thing.
+    If the subset is within the tolerated error, the difference also has to exceed a law's difference in detail.
     """
     earned = gain(less, more) > criteria.least_gain and p_value(less, more) * looked_at <= criteria.significant
     return earned and (less.joint_errors.max() > criteria.tolerated or worse(less, more, criteria))
 
 
 def likelihood(before: Judgement, after: Judgement) -> Array:
-    """Twice the log likelihood (G,) that each segment gains by the second model, the size of its errors unknown.
+    """Return twice the log-likelihood ratio (G,) of two models by segment, the variance of the errors unknown.
 
-    At the noise that is the difference of squared errors; far from it, ratios count, so that no single segment decides.
-    The sensor's variance counts as one sample more: else a joint that rests as its model does were infinitely likely.
+    Near the noise floor this is the difference of squared errors; far from it, their ratio, so that no single segment
+    decides. The sensor variance counts as one more sample, which keeps a joint at rest finite.
     """
     return np.asarray((before.samples + 1.0) * np.log((1.0 + before.costs) / (1.0 + after.costs)))
 
 
 def standing_out(difference: Array, judged: Judgement) -> float:
-    """Sum of differences (G,) in units of its own scatter, from block to block."""
+    """Return the sum of differences (G,) over its standard error, estimated from block to block."""
     blocks = in_blocks(difference, judged)
     if len(blocks) < FEWEST_BLOCKS:
         return 0.0
@@ -154,9 +152,9 @@ def standing_out(difference: Array, judged: Judgement) -> float:
 
 
 def p_value(before: Judgement, after: Judgement) -> float:
-    """Probability of such paired differences if the second model were no better (Student's t over blocks, one-sided).
+    """Return the one-sided p-value of a paired t-test over blocks of segments; low if the second model is better.
 
-    What is paired are blocks of segments as long as the differences remember themselves.
+    Blocks are as long as the autocorrelation of the differences.
     """
     difference = likelihood(before, after)
     count = len(in_blocks(difference, after))
@@ -164,10 +162,9 @@ def p_value(before: Judgement, after: Judgement) -> float:
 
 
 def in_blocks(difference: Array, judged: Judgement) -> Array:
-    """Sums (B,) of differences (G,) over neighbouring segments of a trial, as many as their correlation is long.
+    """Return sums (B,) of differences (G,) over blocks of neighbouring segments, as long as their autocorrelation.
 
-    Where enough segments tell the two models apart the others are left out, as ties are: where nothing moves neither
-    is better, and next to trials in which one always is that would pass for a correlation as long as a trial.
+    Ties are left out if enough segments differ: segments at rest would look like a correlation as long as a trial.
     """
     counted = judged.samples > 0
     telling = counted & (np.abs(difference) >= SLIGHT)
@@ -182,11 +179,10 @@ def in_blocks(difference: Array, judged: Judgement) -> Array:
 
 
 def correlation_length(difference: Array, trial: NDArray[np.int64]) -> int:
-    """How many neighbouring differences (G,) say as much as one: 1 + 2 x the sum of their autocorrelation.
+    """Return the integrated autocorrelation time of differences (G,) in segments: 1 + 2 x the sum of autocorrelations.
 
-    Of signs, for these are what a signed-rank test takes as independent; sizes follow the motion. Up to the first lag
-    at which they cannot be told from independent ones. Source: Geyer, Practical Markov chain Monte Carlo, Statistical
-    Science 7, 1992.
+    Signs are used, since sizes follow the motion, up to the first lag that is not significant.
+    Source: Geyer, Practical Markov chain Monte Carlo, Statistical Science 7, 1992.
     """
     signs = np.sign(difference) - np.mean(np.sign(difference)) if len(difference) else difference
     variance = float(np.mean(signs**2)) if len(signs) else 0.0
@@ -210,10 +206,10 @@ ITERATIONS = 3  # that the joint offsets of unseen initialisations take
 
 
 class HeldOut:
-    """Trials to judge by, simulated freely from their measured starts."""
+    """Validation trials, simulated freely from their measured starts."""
 
     def __init__(self, shooting: Shooting, trials: Recording, noise: Array, offsets: Mapping[int, Array]) -> None:
-        """Take what judges.
+        """Take the validation trials.
 
         Args:
             shooting: simulates.
@@ -226,7 +222,7 @@ class HeldOut:
 
     @cached_property
     def problem(self) -> Problem:
-        """By which joint offsets are found."""
+        """The problem in which joint offsets are fitted."""
         return Problem(self.shooting, self.shooting.cut(self.trials, self.noise))
 
     def error(self, model: Model) -> float:

@@ -1,4 +1,4 @@
-"""A set of effects that may be what is missing: when it earns its place, and which of several is the simplest."""
+"""Sets of effects: significance, completeness, and the choice of the simplest."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from tactile_cube.identification.search.evidence import Judgement, gain, lacking
 
 @dataclass(frozen=True)
 class Explanation:
-    """A set of effects with everything refitted.
+    """Refitted model with a set of effects.
 
     Attributes:
         effects: candidates in the order in which they were added.
         fit: on the fitted trials.
         judgement: on the held-out trials.
-        p_value: of the last effect, corrected for the number of effects that were judged beside it.
-        gain: held-out share that the last effect explains.
+        p_value: against the base model, corrected for the number of laws screened.
+        gain: share of the held-out squared error that it explains.
     """
 
     effects: tuple[Candidate, ...]
@@ -47,21 +47,21 @@ class Explanation:
 
     @property
     def size(self) -> int:
-        """Numbers fitted beyond the base, those of a state's start among them."""
+        """Number of parameters beyond the base, initial states included."""
         return sum(c.size + len(c.joints) * c.effect.chosen_starts for c in self.effects)
 
     @property
     def terms(self) -> int:
-        """How many of the model's terms it adds to those that were known before."""
+        """Number of terms that it adds to the model."""
         return sum(len(c.joints) for c in self.effects)
 
     def explained(self, base: Explanation) -> float:
-        """Share of the base model's excess over the sensor noise that is explained."""
+        """Return the share of another model's excess error over the sensor noise that this one explains."""
         return (base.error**2 - self.error**2) / max(base.error**2 - 1.0, 1e-9)
 
 
 def simplest(found: Sequence[Explanation], criteria: Criteria = STANDARD) -> Explanation:
-    """The explanation with the fewest effects, then numbers, among those that are as good as the best."""
+    """Return the explanation with the fewest effects, then parameters, among those as good as the best."""
     best = min(found, key=lambda e: e.judgement.costs.sum())
     equal = [e for e in found if not worse(e.judgement, best.judgement, criteria)]
     return min(equal, key=lambda e: (len(named(e)), e.size, e.judgement.costs.sum()))
@@ -70,11 +70,10 @@ def simplest(found: Sequence[Explanation], criteria: Criteria = STANDARD) -> Exp
 def sound(
     found: Sequence[Explanation], base: Explanation, criteria: Criteria = STANDARD, looked_at: int = 1
 ) -> list[Explanation]:
-    """Explanations of which sets that differ from them by whole effects show none as missing and none as needless.
+    """Return the explanations that no subset shows to have a needless effect and no superset to lack one.
 
-    What is missing may be any of the effects that were looked at. Where a set is complete, what comes to it has to take
-    away most of the rest, as a law that is there does: laws that differ from the real thing in detail leave a rest of
-    which others take a part.
+    Significance is corrected for the number of laws screened. An effect added to a complete set has to explain most of
+    the rest: where a law differs in form from the machine, many others explain a part of what it leaves.
     """
 
     def refuted(one: Explanation, other: Explanation) -> bool:
@@ -91,7 +90,7 @@ def sound(
 
 
 def contains(richer: Explanation, simple: Explanation) -> bool:
-    """Whether two explanations differ in the last effect alone, and one's is a special case of the other's."""
+    """Return whether two explanations differ only in their last effects, one a special case of the other."""
     if not simple.effects or named_by(simple.effects[:-1]) != named_by(richer.effects[:-1]):
         return False
     last, special = richer.effects[-1], simple.effects[-1]
@@ -99,40 +98,40 @@ def contains(richer: Explanation, simple: Explanation) -> bool:
 
 
 def named(explanation: Explanation) -> frozenset[tuple[str, str]]:
-    """The (effect, joint) pairs of an explanation, whatever their form."""
+    """Return the (effect, joint) pairs of an explanation, whatever their form."""
     return named_by(explanation.effects)
 
 
 def named_by(effects: Sequence[Candidate]) -> frozenset[tuple[str, str]]:
-    """The same of single effects."""
+    """Return the (effect, joint) pairs of candidates."""
     return frozenset((c.effect.name, joint) for c in effects for joint in c.joints)
 
 
 def proven(explanation: Explanation, criteria: Criteria = STANDARD) -> bool:
-    """Whether a set explains enough, and held-out segments tell it from chance, all that was looked at counted."""
+    """Return whether a set is a large and significant improvement on held-out trials."""
     return explanation.gain >= criteria.least_gain and explanation.p_value <= criteria.significant
 
 
 def complete(explanation: Explanation, base: Explanation, criteria: Criteria = STANDARD) -> bool:
-    """Whether a set leaves so little that nothing more is missing."""
+    """Return whether a set leaves so little error that nothing more is missing."""
     share = explanation.explained(base)
     little = explanation.largest_error <= criteria.tolerated or share > criteria.nearly_whole
     return little and (explanation.error <= criteria.adequate or share >= criteria.most)
 
 
 def nameable(explanation: Explanation, base: Explanation, criteria: Criteria = STANDARD) -> bool:
-    """Whether a set is the whole or at least a part of the truth; what explains less is unknown."""
+    """Return whether a set explains enough to be named, completely or in part."""
     return complete(explanation, base, criteria) or explanation.explained(base) >= criteria.most
 
 
 def unproven(explanation: Explanation, criteria: Criteria = STANDARD) -> bool:
-    """Whether a set explains much, and that may be chance."""
+    """Return whether a set is a large improvement that is not significant."""
     return explanation.gain > criteria.detail and not proven(explanation, criteria)
 
 
 @dataclass(frozen=True)
 class Proposal:
-    """A set of effects and how it fits; no held-out trial has been asked.
+    """Set of effects fitted to the training trials; held-out trials are not used.
 
     Attributes:
         effects: in the order in which they came.
@@ -148,19 +147,19 @@ class Proposal:
         return " & ".join(c.label for c in self.effects) or "the refitted model"
 
     def price(self, criteria: Criteria) -> float:
-        """Squared error with the price of its numbers."""
+        """Return the squared error with a penalty for each parameter."""
         return priced(self.fit.cost, self.effects, criteria)
 
 
 def priced(cost: float, effects: Sequence[Candidate], criteria: Criteria) -> float:
-    """Squared error, with as much for each number as an effect has to explain at least."""
+    """Return a squared error with a penalty of `least_gain` for each parameter."""
     return float(cost / (1.0 - criteria.least_gain) ** sum(one.size for one in effects))
 
 
 def at_bound(one: Explanation | Proposal) -> bool:
-    """Whether a number of its effects ends at its lower or upper bound.
+    """Return whether a parameter of its effects is at a bound that is not its neutral value.
 
-    Then the law stands in for another one: so do waves longer than the range of motion for any bent curve.
+    The law then imitates another one, as a wave longer than the range of motion imitates any curve.
     """
     model, added = one.fit.model, sum(len(effect.joints) for effect in one.effects)
     return any(

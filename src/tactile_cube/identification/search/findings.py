@@ -1,4 +1,4 @@
-"""The search: every law by itself, sets that grow while a joint is off, few sets judged once on held-out trials."""
+"""Forward selection of effects: single laws, growing sets, and one comparison on held-out trials."""
 
 from __future__ import annotations
 
@@ -45,21 +45,21 @@ from tactile_cube.identification.search.search import Search
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model, Term
 
-MOST = 4  # laws in a set, each at all joints that need it
-JUDGED = 6  # sets that the held-out trials judge in any case, and most of what may stand for one of the chosen effects
+MOST = 4  # laws in a set, each at all the joints where it improves the fit
+JUDGED = 6  # cheapest sets that are scored on held-out trials, and most alternatives to one of the chosen effects
 
 
 @dataclass(frozen=True)
 class Findings:
-    """Everything that a search has tried.
+    """Results of a search.
 
     Attributes:
         base: the refitted base model.
         nominal: the model before any fit, judged on the held-out trials.
-        judged: sets that the held-out trials judged.
-        scores: the first look at every law, best first.
-        looked: laws at joints that were looked at, each of which may seem best by chance.
-        stopped: what was left to try as the search ran out of simulations; empty where it ended by itself.
+        judged: sets scored on the held-out trials.
+        scores: first-order gain of every law, best first.
+        looked: number of laws screened, for the correction of multiple comparisons.
+        stopped: next step when the simulation budget ran out; empty if the search finished.
     """
 
     base: Explanation
@@ -70,10 +70,10 @@ class Findings:
     stopped: str = ""
 
     def proven(self, criteria: Criteria = STANDARD) -> list[Explanation]:
-        """Sets that are no chance, best first; none beside a base model at the floor but a shared offset.
+        """Return the significant sets, best first; only a shared offset if the base model is at the noise floor.
 
-        Once one of them proves that something is missing, another set of as few effects that does better is no chance
-        either, however few blocks there are to show that it is none.
+        Once one set proves that something is missing, a better set with as few effects counts as significant too: its
+        own p-value may be high only because it was compared over few blocks.
         """
         found = [one for one in self.judged if proven(one, criteria)]
         if self.base.largest_error <= criteria.floor:
@@ -90,18 +90,18 @@ class Findings:
         return sorted(found, key=lambda one: one.judgement.costs.sum())
 
     def kept(self, criteria: Criteria = STANDARD) -> list[Explanation]:
-        """Those of them that are not clearly worse than the best."""
+        """Return the significant sets that are not clearly worse than the best."""
         found = self.proven(criteria)
         return [one for one in found if not worse(one.judgement, found[0].judgement, criteria)]
 
     def unproven(self, criteria: Criteria = STANDARD) -> list[Explanation]:
-        """What would explain much and may be chance, best first; nothing beside what is proven."""
+        """Return large improvements that are not significant, best first; none if any set is significant."""
         doubtful = [] if self.proven(criteria) else [one for one in self.judged if unproven(one, criteria)]
         return sorted(doubtful, key=lambda one: one.error)
 
 
 def find(search: Search) -> Findings:
-    """Search a recording for what its model lacks."""
+    """Search a recording for the effects that its model lacks."""
     base, nominal = search.base, search.judged(search.start)
     search.say(f"base refitted: held-out error {base.error:.2f} x sensor noise")
     if base.largest_error <= search.criteria.floor:
@@ -127,7 +127,7 @@ def find(search: Search) -> Findings:
 
 
 def proposed(search: Search) -> tuple[list[Proposal], Looks | None]:
-    """Sets by their fit alone, and the first look."""
+    """Return candidate sets, ranked on the fitted trials alone, and the screening of single laws."""
     parent = Proposal((), search.base.fit)
     found: list[Proposal] = []
     first: Looks | None = None
@@ -154,9 +154,9 @@ def proposed(search: Search) -> tuple[list[Proposal], Looks | None]:
 
 
 def out_of_reach(search: Search, before: Proposal, one: Proposal) -> bool:
-    """Whether a set will not come to be named, even if each further law takes away as much as each of the last did.
+    """Return whether a set cannot explain enough to be named, even if further laws explain as much as the last.
 
-    Those that take away most come first, so the next ones take less.
+    Laws are added in the order of what they explain, so the next ones explain less.
     """
     criteria, rows = search.criteria, np.count_nonzero(search.problem.weight)
     taken = (before.fit.cost - one.fit.cost) / max(laws_of(one) - laws_of(before), 1)
@@ -166,9 +166,9 @@ def out_of_reach(search: Search, before: Proposal, one: Proposal) -> bool:
 
 
 def in_detail(search: Search, before: Proposal, one: Proposal) -> bool:
-    """Whether a set had explained nearly the whole, and what came to it has not taken away most of the rest.
+    """Return whether a set explained nearly everything and the laws added to it explain less than most of the rest.
 
-    Then the rest is what its laws differ by from the real thing, and further laws take a part of it again.
+    The rest is then a difference in form between its laws and the machine, of which any further law explains a part.
     """
     criteria, rows = search.criteria, np.count_nonzero(search.problem.weight)
     rest = before.fit.cost - rows
@@ -177,12 +177,12 @@ def in_detail(search: Search, before: Proposal, one: Proposal) -> bool:
 
 
 def laws_of(one: Proposal) -> int:
-    """How many laws a set has, wherever they act."""
+    """Return the number of laws in a set, however many joints they act at."""
     return len({effect.effect.name for effect in one.effects})
 
 
 def reduced(search: Search, one: Proposal) -> list[Proposal]:
-    """Sets that are left when one effect after another is taken out, the one that is missed least."""
+    """Return the sets of a backward elimination: one effect after another removed, the least important first."""
     found: list[Proposal] = []
     while (laws_of(one) > 1 or 1 < len(one.effects) <= MOST) and not search.spent:
         less = [without(search, one, *places) for places in together(one.effects)]
@@ -192,7 +192,7 @@ def reduced(search: Search, one: Proposal) -> list[Proposal]:
 
 
 def together(effects: Sequence[Candidate]) -> list[list[int]]:
-    """Places of effects to be taken out together: each by itself; of more than `MOST`, those of one law."""
+    """Return indices of effects to remove together: one at a time, or all of one law in sets of more than `MOST`."""
     if len(effects) <= MOST:
         return [[place] for place in range(len(effects))]
     names = [effect.effect.name for effect in effects]
@@ -200,7 +200,7 @@ def together(effects: Sequence[Candidate]) -> list[list[int]]:
 
 
 def to_be_judged(found: Sequence[Proposal], search: Search) -> list[Proposal]:
-    """The cheapest of those that name the same effects, cheapest first: some, and the first of every number of laws."""
+    """Return the sets to score: the `JUDGED` cheapest, and the cheapest of each number of laws."""
     cheapest: dict[frozenset[tuple[str, str]], Proposal] = {}
     for one in sorted(found, key=lambda one: one.price(search.criteria)):
         cheapest.setdefault(named_by(one.effects), one)
@@ -211,10 +211,10 @@ def to_be_judged(found: Sequence[Proposal], search: Search) -> list[Proposal]:
 
 
 def twins(search: Search, chosen: Explanation, first: Looks, judged: Sequence[Explanation]) -> list[Proposal]:
-    """Sets with another law in the place of one of the chosen ones that fit as well with everything free.
+    """Return sets in which another law replaces a chosen one and fits as well after a full refit.
 
-    The laws that a chosen one becomes at the edge of its numbers come first, and are tried in any case where an
-    interval reaches that edge, as is the set without the effect. What has many more numbers is no twin.
+    Special cases of the chosen law come first and are always tried if its interval reaches the value at which it
+    becomes them, as is the set without the effect. A law with many more parameters is not tried.
     """
     known = {named_by(one.effects) for one in judged}
     itself, found = Proposal(chosen.effects, chosen.fit), list[Proposal]()
@@ -249,7 +249,7 @@ def twins(search: Search, chosen: Explanation, first: Looks, judged: Sequence[Ex
 
 
 def instead(looks: Looks, replaced: Sequence[Candidate]) -> list[Tried]:
-    """What may stand for some effects, best first: any law for a single one, one law at as many joints for several."""
+    """Return replacements, best first: any law for a single effect, one law at as many joints for several."""
     if len(replaced) == 1:
         return [(one,) for one in looks.tried]
     kinds = [places for places in of_a_kind([law for law, _ in looks.tried]) if len(places) == len(replaced)]
@@ -257,10 +257,7 @@ def instead(looks: Looks, replaced: Sequence[Candidate]) -> list[Tried]:
 
 
 def simpler_laws(search: Search, chosen: Explanation, place: int) -> set[str]:
-    """Effects that one of a set may just as well be: what it becomes at a value that its interval reaches.
-
-    A table may be any of its special shapes.
-    """
+    """Return the special cases of an effect that its intervals include; those of a table always count."""
     fitted = search.frozen(chosen.fit)
     first = first_term(fitted.model, chosen.effects, place)
     width = NORMAL_95 * standard_errors(search.problem, fitted)
@@ -277,20 +274,20 @@ def simpler_laws(search: Search, chosen: Explanation, place: int) -> set[str]:
 
 
 Array = NDArray[np.float64]
-LEAST = 0.012  # [rad] of a finger: joint offsets below this are ordinary
-UNLIKELY = 0.001  # probability, over all joints, of such offsets by initialising alone at which they are still ordinary
-STRIKING, DOUBTFUL = 0.03, 0.1  # [rad] of a finger, and probability from which on they are worth a word
+LEAST = 0.012  # [rad] of a finger: smaller joint offsets are ordinary
+UNLIKELY = 0.001  # p-value over all joints below which offsets are not explained by initialisation
+STRIKING, DOUBTFUL = 0.03, 0.1  # [rad] of a finger and p-value: offsets between them are mentioned
 
 
 @dataclass(frozen=True)
 class CommonOffset:
-    """A joint offset that is much the same in every initialisation.
+    """Joint offset that is similar in every initialisation.
 
     Attributes:
         joint: its name.
         offset: mean, as position_offset counts it [rad].
-        initialisations: how many agree.
-        by_chance: probability of such agreement by initialising alone.
+        initialisations: number that agree.
+        by_chance: p-value of the agreement.
     """
 
     joint: str
@@ -302,10 +299,10 @@ class CommonOffset:
 def shared_offset(
     base: Explanation, fitted: Recording, effects: Sequence[type[Effect]], sizes: Sizes
 ) -> Explanation | None:
-    """The base model with the offsets that all initialisations share as an effect; None if there are none.
+    """Return the base model with an encoder offset at joints whose initialisations agree; None if there are none.
 
-    A joint offset that differs between initialisations is what initialising does, and no error of the model. Two or
-    three initialisations whose offsets happen to be alike are no evidence either: Student's t decides.
+    Offsets that differ between initialisations come from initialising and are no model error. Student's t decides
+    whether two or three similar ones are significant.
     """
     effect = next((effect for effect in effects if effect.constant_reading), None)
     if effect is None or len(base.judgement.model.offsets) < 2:
@@ -327,7 +324,7 @@ def shared_offset(
 
 
 def common_offsets(base: Explanation, sizes: Sizes) -> tuple[CommonOffset, ...]:
-    """Large offsets that every initialisation has and that two or three of them do not prove to be the encoder's."""
+    """Return large offsets that agree between initialisations but not significantly."""
     count = len(base.judgement.model.offsets)
     if count < 2:
         return ()
@@ -340,11 +337,10 @@ def common_offsets(base: Explanation, sizes: Sizes) -> tuple[CommonOffset, ...]:
 
 
 def _mean_and_chance(base: Explanation, sizes: Sizes) -> tuple[Array, Array]:
-    """Mean offsets (n,) over the initialisations, and how probable their likeness is (Student's t).
+    """Return mean offsets (n,) over the initialisations and the p-values (n,) of their agreement (Student's t).
 
-    The joints of a machine are initialised in one way, so what their offsets scatter by, each in its own scale, is one
-    number that all of them tell: three initialisations of a single joint say little. Where a joint's own scatter is
-    larger it counts.
+    The scatter is pooled over the joints of a machine, each in its own scale; a joint's own scatter counts if it is
+    larger.
     """
     scale = np.array([one.of("rad") for one in sizes.values()])
     offsets = -np.array([base.judgement.model.offsets[k] for k in sorted(base.judgement.model.offsets)]) / scale

@@ -1,4 +1,4 @@
-"""Which sets of effects may be what is missing, by their fit alone: every law by itself, pairs, and all of a kind."""
+"""Candidate sets of effects, ranked on the fitted trials: single laws, pairs, and one law at several joints."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ from tactile_cube.measurement.replay.windows import Windows
 
 Array = NDArray[np.float64]
 LOOKED_AT = 4  # part of the segments to judge by, on which every law gets its own steps
-PROMISING = 0.01  # of its joint's squared error: what a law promises less than at first has never come to a fifth of it
-STEPS = 2  # of Gauss-Newton that every other law gets
-MORE_STEPS = 6  # that a law gets which may be a twin of the chosen one
-LARGER = 2.0  # times that a law may be in a set what its own steps made it: what it changes is known near that
+PROMISING = 0.01  # of its joint's squared error: least first-order gain of a law that is fitted
+STEPS = 2  # of Gauss-Newton for each promising law
+MORE_STEPS = 6  # for a law that may be an alternative to a chosen one
+LARGER = 2.0  # most that a law is scaled up within a set; its linearisation holds near its own fit
 SINGLES = 4  # laws that are refitted exactly
-LEAVE_LEAST, CHEAPEST = 3, 2  # sets of several that are: own steps leave so much still that numbers may look too dear
-CLOSE = 2.5  # squared error over the best one's up to which another law may do as well when everything is free
+LEAVE_LEAST, CHEAPEST = 3, 2  # pairs that are refitted: with the smallest predicted error, with the lowest price
+CLOSE = 2.5  # ratio of squared errors up to which a full refit may make another law as good as the best
 
 
 Tried = tuple[tuple[Candidate, Fit], ...]
@@ -45,15 +45,15 @@ Tried = tuple[tuple[Candidate, Fit], ...]
 
 @dataclass(frozen=True)
 class Looks:
-    """Every law beside a fitted set, after two steps of its own.
+    """Screening of all laws beside a fitted set.
 
     Attributes:
-        parent: the set.
-        problem: few windows.
-        frozen: its fit there.
-        alike: the same after as many steps as every law gets, so that what a law changes is its own.
-        tried: laws that promise something, with their fits there, best first.
-        scores: the first look at every law, best first.
+        parent: the fitted set.
+        problem: the windows used, fewer than in a full fit.
+        frozen: fit of the set on these windows.
+        alike: the same after as many steps as each law gets, as the reference of their gains.
+        tried: promising laws with their fits, best first.
+        scores: first-order gain of every law, best first.
     """
 
     parent: Proposal
@@ -65,17 +65,17 @@ class Looks:
 
     @property
     def laws(self) -> int:
-        """How many laws were looked at: starts of one law are no other law."""
+        """Number of laws screened, each counted once whatever its starts."""
         return len({key(score.candidate) for score in self.scores})
 
 
 def off(search: Search, one: Fit) -> list[int]:
-    """Joints whose error on the fitted trials is above the floor, the whole machine's included."""
+    """Return the joints whose error on the fitted trials exceeds the noise floor."""
     return [int(j) for j in np.flatnonzero(joint_errors(search.problem, one.residual) > search.criteria.floor)]
 
 
 def look(search: Search, parent: Proposal, at: Sequence[str]) -> Looks:
-    """Every law at these joints that promises something gets its own steps beside a set that is fitted."""
+    """Screen all laws at some joints beside a fitted set, and fit the promising ones."""
     problem = Problem(search.shooting, failing_windows(search, parent.fit))
     problem.linearise_starts(parent.fit.model)
     frozen = renewed(problem, parent.fit, *problem.columns(parent.fit.model, parent.fit.unknowns))
@@ -94,9 +94,9 @@ def look(search: Search, parent: Proposal, at: Sequence[str]) -> Looks:
 
 
 def failing_windows(search: Search, fitted: Fit) -> Windows:
-    """Few windows of those that a set was fitted to: half of them where it fails most, half spread over all.
+    """Return few of the fitted windows: half of them with the largest error, half spread over all.
 
-    A law that acts in rare moments alone, as a limit does, shows nowhere else.
+    A law that acts rarely, as a limit does, is visible only where the set fails.
     """
     windows = search.problem.windows
     wanted = -(-search.segments // (LOOKED_AT * windows.segments))
@@ -107,18 +107,18 @@ def failing_windows(search: Search, fitted: Fit) -> Windows:
 
 
 def wanted(search: Search, problem: Problem, frozen: Fit) -> list[Candidate]:
-    """What may be added to a fit: at starts of its own, or read from what the fit leaves."""
+    """Return candidate effects, with starts of their own or estimated from the residual."""
     return search.new([*search.candidates, *residual_candidates(problem, search.fitted, frozen, search.effects)])
 
 
 def stepped(problem: Problem, frozen: Fit, candidate: Candidate) -> tuple[Candidate, Fit]:
-    """A law after its own steps beside a fit, whose columns stay."""
+    """Fit a law alone beside a frozen fit."""
     model, unknowns = candidate.added_to(frozen.model)
     return candidate, fit(problem, model, unknowns, STEPS, frozen)
 
 
 def best_starts(scores: Sequence[Score]) -> list[Candidate]:
-    """Of every law in every form at every joint the start that promises most, as large as it promises."""
+    """Return the start with the largest first-order gain of each law, form and joint, scaled to its optimum."""
     starts: dict[tuple[str, tuple[str, ...], tuple[str, ...]], list[Score]] = {}
     for score in scores:
         starts.setdefault(key(score.candidate), []).append(score)
@@ -126,14 +126,14 @@ def best_starts(scores: Sequence[Score]) -> list[Candidate]:
 
 
 def key(candidate: Candidate) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
-    """A law in a form at its joints."""
+    """Return the key of a law in a form at its joints."""
     return candidate.effect.name, tuple(candidate.form), candidate.joints
 
 
 def grown(search: Search, looks: Looks) -> list[Proposal]:
-    """The most promising sets that contain the parent, everything refitted, cheapest first.
+    """Return refitted sets that extend the parent, cheapest first.
 
-    Once one leaves nothing, only those are refitted too that their own steps have brought near it.
+    Once a set is at the noise floor, only laws whose own fit came close to it are refitted too.
     """
     by_name: dict[tuple[str, tuple[str, ...]], Tried] = {}
     for candidate, fitted in looks.tried:
@@ -149,10 +149,7 @@ def grown(search: Search, looks: Looks) -> list[Proposal]:
 
 
 def in_its_forms(search: Search, looks: Looks, forms: Tried) -> list[Proposal]:
-    """A law in the form that promises most, plain and with its details free.
-
-    In the next form too where a number of it ends at an edge.
-    """
+    """Refit a law in its best form, plain and detailed, and in the next form if a parameter is at a bound."""
     found: list[Proposal] = []
     for law in forms:
         if not search.spent and all(at_bound(one) for one in found):
@@ -162,36 +159,36 @@ def in_its_forms(search: Search, looks: Looks, forms: Tried) -> list[Proposal]:
 
 
 def whole(search: Search, found: Sequence[Proposal]) -> bool:
-    """Whether one of the sets leaves no joint off."""
+    """Return whether one of the sets is at the noise floor at every joint."""
     return any(not off(search, one.fit) for one in found)
 
 
 def near(looks: Looks, left: float, found: Sequence[Proposal]) -> bool:
-    """Whether what laws leave after their own steps has come near what the best set leaves in the same windows."""
+    """Return whether the error of laws after their own steps is close to that of the best set on the same windows."""
     return bool(left <= CLOSE * min(fit(looks.problem, one.fit.model, (), 0).cost for one in found))
 
 
 def explains_most(search: Search, looks: Looks, left: float) -> bool:
-    """Whether laws have explained most of what the set leaves above the noise by their own steps."""
+    """Return whether laws explain most of the excess error of the set by their own steps."""
     count = np.count_nonzero(looks.problem.weight)
     most = search.criteria.most
     return bool(left - count <= max((1.0 - most) * (looks.alike.cost - count), (CLOSE - 1.0) * count))
 
 
 def left_by(looks: Looks, laws: Tried) -> float:
-    """Squared error that laws leave after their own steps: of several, what each has taken away counts."""
+    """Return the squared error after the laws' own steps; the gains of several are added."""
     return laws[0][1].cost - sum(looks.alike.cost - fitted.cost for _, fitted in laws[1:])
 
 
 def further(looks: Looks, candidate: Candidate, fitted: Fit) -> tuple[Candidate, Fit]:
-    """A law after more steps of its own, its details free: a twin is as good only once what is beside it has moved."""
+    """Fit a law further, with its details free: an alternative fits as well only once other parameters have moved."""
     own = fitted.unknowns[len(looks.frozen.unknowns) :]
     detailed, model, unknowns = with_details(candidate, fitted.model) or (candidate, fitted.model, own)
     return detailed, fit(looks.problem, model, unknowns, MORE_STEPS, looks.frozen)
 
 
 def refitted(search: Search, looks: Looks, laws: Tried) -> Proposal:
-    """A set with some laws more, each at its own fit to begin with, everything free."""
+    """Refit the parent with some more laws, each started from its own fit."""
     known = len(looks.frozen.model.terms)
     terms = [term for _, fitted in laws for term in fitted.model.terms[known:]]
     model = replace(looks.frozen.model, terms=(*looks.frozen.model.terms, *terms))
@@ -200,7 +197,7 @@ def refitted(search: Search, looks: Looks, laws: Tried) -> Proposal:
 
 
 def noted(search: Search, one: Proposal) -> Proposal:
-    """A set, once it has been said, and that it is the best one so far if it is."""
+    """Report a set, and note it if it is the best so far."""
     left = search.over_noise(one.fit)
     if left < search.least:
         search.least = left
@@ -210,7 +207,7 @@ def noted(search: Search, one: Proposal) -> Proposal:
 
 
 def detailed(search: Search, one: Proposal) -> Proposal | None:
-    """A set with the details of its last law free too, if it has any."""
+    """Refit a set with the details of its last law free; None if it has none."""
     if not (richer := with_details(one.effects[-1], one.fit.model)):
         return None
     candidate, model, _ = richer
@@ -218,13 +215,12 @@ def detailed(search: Search, one: Proposal) -> Proposal | None:
 
 
 def sets(looks: Looks, criteria: Criteria) -> list[Tried]:
-    """Pairs of laws, and one law at several joints, that would leave least, and the cheapest.
+    """Return the most promising pairs of laws, and of one law at several joints, without simulating them.
 
-    What counts is what trials would be left with that a set was not sized by.
-
-    What each law changes is known from its own fit; together they are sized by least squares, on all trials but one in
-    turn, from products that were summed trial by trial. Source: Allen, The relationship between variable selection and
-    data augmentation and a method for prediction, Technometrics 16, 1974 (the PRESS statistic).
+    The change that each law makes is known from its own fit; the laws of a set are scaled by least squares, and the
+    error is predicted by leaving out one trial at a time, from products summed trial by trial.
+    Source: Allen, The relationship between variable selection and data augmentation and a method for prediction,
+    Technometrics 16, 1974 (the PRESS statistic).
     """
     problem, laws = looks.problem, looks.tried
     if len(laws) < 2:
@@ -247,9 +243,9 @@ def sets(looks: Looks, criteria: Criteria) -> list[Tried]:
 
 
 def wanted_sets(laws: Sequence[Candidate]) -> Iterator[list[int]]:
-    """Places of laws that may act together: any two in their best forms, one law in one form at three joints and more.
+    """Yield indices of laws that may act together: pairs in their best forms, one law at three joints or more.
 
-    The laws come best first.
+    The laws are sorted, best first.
     """
     best: dict[tuple[str, tuple[str, ...]], int] = {}
     for place, law in enumerate(laws):
@@ -259,7 +255,7 @@ def wanted_sets(laws: Sequence[Candidate]) -> Iterator[list[int]]:
 
 
 def of_a_kind(laws: Sequence[Candidate]) -> list[list[int]]:
-    """Places of one law in one form at every joint where it was tried, law by law."""
+    """Return, for each law and form, the indices of the joints where it was tried."""
     kinds: dict[tuple[str, tuple[str, ...]], dict[tuple[str, ...], int]] = {}
     for place, law in enumerate(laws):
         kinds.setdefault((law.effect.name, tuple(law.form)), {}).setdefault(law.joints, place)
@@ -267,7 +263,7 @@ def of_a_kind(laws: Sequence[Candidate]) -> list[list[int]]:
 
 
 def products(problem: Problem, frozen: Fit, fits: Sequence[Fit]) -> tuple[Array, Array]:
-    """Gradients (T, C) and products (T, C, C) of what C laws change, trial by trial, constants and starts taken out."""
+    """Return gradients (T, C) and Gram matrices (T, C, C) of C laws by trial, constants and starts projected out."""
     residual = frozen.residual
     changes = np.stack([residual - one.residual for one in fits], axis=-1)
     weight = noise_inflation(problem, frozen.cost) * precision(frozen.unknowns)
@@ -282,9 +278,9 @@ def products(problem: Problem, frozen: Fit, fits: Sequence[Fit]) -> tuple[Array,
 
 
 def press(gradient: Array, gram: Array, expected: float) -> float:
-    """What trials gain by columns that the others have sized: gradients (T, C), products (T, C, C).
+    """Return the leave-one-trial-out gain of columns with gradients (T, C) and Gram matrices (T, C, C).
 
-    Each law was sized by its own steps, so no factor turns it round or makes it more than `LARGER` times as large.
+    Each law has the size of its own fit, so factors are limited to 0 to `LARGER`.
     """
     total, whole = gradient.sum(axis=0), gram.sum(axis=0) + expected * np.eye(gram.shape[1])
     others = (whole - gram, total - gradient) if len(gradient) > 1 else (whole[None], total[None])
@@ -293,7 +289,7 @@ def press(gradient: Array, gram: Array, expected: float) -> float:
 
 
 def without(search: Search, one: Proposal, *places: int) -> Proposal:
-    """The set without some of its effects, refitted."""
+    """Refit a set without some of its effects."""
     model, effects = one.fit.model, one.effects
     for place in sorted(places, reverse=True):
         model, effects = without_effect(model, effects, place), (*effects[:place], *effects[place + 1 :])

@@ -1,4 +1,4 @@
-"""A recording divided in trials to fit and to judge by, and the laws that may be missing there."""
+"""Search problem: a recording split into fitted and held-out trials, and the candidate laws."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 LONG = 8  # most iterations of a refit; one that converges ends before
 SEGMENTS = 132  # enough data to judge by, 52.8 s of a finger; the final fit takes all
 RENEWED, HELPS = 3, 0.98  # times that starts are taken anew, and part of the squared error that has to be left for that
-FITTED = 2  # part of as many that a refit of a search takes: no answer was lost by it, and half the time saved
+FITTED = 2  # a refit within the search takes one segment in so many, which saves half the time
 ENOUGH = 24  # held-out segments at least
 FEWEST_ROWS = 8  # of a segment, for its start is unknown too
 GROWN = 3.0  # squared, an order of magnitude: from there on few unstable segments outweigh all stable ones
@@ -52,7 +52,7 @@ class BestSoFar:
 
 
 class Search:
-    """A recording with its trials divided in two, and the effects that may be missing.
+    """Recording with its trials split in two, and the effects that may be missing.
 
     Attributes:
         shooting: simulates both parts.
@@ -109,7 +109,7 @@ class Search:
 
     @cached_property
     def base(self) -> Explanation:
-        """Refitted constants alone; as they are stated where that follows the held-out trials better."""
+        """Model with refitted constants, or as stated if that predicts the held-out trials better."""
         self.problem.linearise_starts(self.start)
         first = fit(self.problem, self.start, self.unknowns(self.start), iterations=4)
         self.problem.linearise_starts(first.model)
@@ -122,16 +122,16 @@ class Search:
         return Explanation((), second, judgement, 1.0, 0.0)
 
     def windows(self, recording: Recording) -> Windows:
-        """Other trials cut likewise."""
+        """Return shooting windows of other trials, cut in the same way."""
         return self.shooting.cut(recording, self.noise, segment=self.segment)
 
     def unknowns(self, model: Model) -> tuple[Unknown, ...]:
-        """Everything that a refit of the model may change."""
+        """Return the free parameters of a full refit."""
         sizes = self.shooting.sizes
         return (*base_unknowns(self.fitted, self.start.constants, sizes), *model_unknowns(model, sizes))
 
     def frozen(self, fitted: Fit) -> Fit:
-        """A fit with its residual and columns taken anew on this problem, to build on."""
+        """Return a fit with residual and columns updated on this problem."""
         self.problem.linearise_starts(fitted.model)
         prediction, columns = self.problem.columns(fitted.model, fitted.unknowns)
         return renewed(self.problem, fitted, prediction, columns)
@@ -139,12 +139,12 @@ class Search:
     def refit(
         self, frozen: Fit, candidate: Candidate, iterations: int = 6, model: Model | None = None
     ) -> tuple[Candidate, Fit]:
-        """Fit a candidate's numbers beside the frozen columns of its parent, started from `model` or the parent's."""
+        """Fit a candidate beside the frozen columns of its parent, started from `model` or the parent."""
         model, unknowns = candidate.added_to(model or frozen.model)
         return candidate, fit(self.problem, model, unknowns, iterations, frozen=frozen)
 
     def refitted(self, model: Model) -> Fit:
-        """A model with everything that it has fitted, its starts taken anew as long as that helps."""
+        """Refit a model completely, linearising initial states anew as long as that helps."""
         self.problem.linearise_starts(model)
         fitted = fit(self.problem, model, self.unknowns(model), LONG)
         for _ in range(RENEWED):
@@ -156,36 +156,36 @@ class Search:
         return fitted
 
     def over_noise(self, fitted: Fit) -> float:
-        """RMS error of a fit in units of the sensor noise."""
+        """Return the RMS error of a fit in units of the sensor noise."""
         return float(np.sqrt(fitted.cost / np.count_nonzero(self.problem.weight)))
 
     def judged(self, model: Model) -> Judgement:
-        """How a model does on the held-out trials."""
+        """Return the error of a model on the held-out trials."""
         found = model.with_offsets(self.offsets)
         self.validation.linearise_starts(found)
         return judge(self.validation, self.held_out, found)
 
     def stand(self, answer: str, following: str) -> None:
-        """Note the best answer so far and what is tried next, in words."""
+        """Note the best answer so far and the next step, in words."""
         self.say.answer, self.say.following = answer, following
 
     @property
     def following(self) -> str:
-        """What is tried next, in words."""
+        """Next step, in words."""
         return self.say.following
 
     @property
     def spent(self) -> bool:
-        """Whether the search has simulated as much as it may."""
+        """Whether the simulation budget is used up."""
         return self.shooting.simulated > self.criteria.most_simulated
 
     def new(self, wanted: Sequence[Candidate]) -> list[Candidate]:
-        """Without effects that the model to begin with has at that joint already."""
+        """Return candidates without effects that the initial model has at the same joint."""
         known = {(term.effect, term.joint) for term in self.start.terms}
         return [one for one in wanted if not any((one.effect, joint) in known for joint in one.joints)]
 
     def explained(self, one: Proposal, looked_at: int) -> Explanation:
-        """A fitted set on the held-out trials, of which it is one of so many that were looked at."""
+        """Score a fitted set on the held-out trials, its p-value corrected for the number of laws screened."""
         judgement = self.judged(one.fit.model)
         chance = min(1.0, p_value(self.base.judgement, judgement) * looked_at)
         found = Explanation(one.effects, one.fit, judgement, chance, gain(self.base.judgement, judgement))
@@ -194,12 +194,12 @@ class Search:
 
 
 def some(windows: Windows, segments: int) -> Windows:
-    """Windows of about so many segments, spread over trials and over the time within trials."""
+    """Return windows of about so many segments, spread over trials and over the time within trials."""
     return windows.take(np.sort(spread(windows.trial, -(-segments // windows.segments))))
 
 
 def spread(trial: NDArray[np.int64], count: int) -> NDArray[np.int64]:
-    """Places of so many windows, spread over their trials and over the time within trials."""
+    """Return indices of so many windows, spread over their trials and over the time within trials."""
     by_trial = [np.flatnonzero(trial == k) for k in np.unique(trial)]
     order = [
         int(rows[(turn + k) % len(rows)])
@@ -211,10 +211,10 @@ def spread(trial: NDArray[np.int64], count: int) -> NDArray[np.int64]:
 
 
 def steady_rows(shooting: Shooting, model: Model, windows: Windows) -> int:
-    """Rows of a segment, at most those of the windows', within which an error of its start grows `GROWN` times at most.
+    """Return the longest segment, in rows, over which an initial-state error grows at most `GROWN` times.
 
-    A pendulum about its upper rest makes a hundred out of one within a second, and no fit is judged by what is left.
-    The model tells its own growth: the derivative of each joint's position by its position at the segment's start.
+    About its upper rest a pendulum multiplies an error a hundredfold within a second. The growth is the derivative of
+    each joint's position by its position at the start of the segment.
     """
     joints = len(shooting.recording.joints)
     slopes = shooting.start_sensitivity(model, windows)[:joints]

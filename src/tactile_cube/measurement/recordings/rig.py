@@ -72,7 +72,7 @@ class Rig:
         return {key: row for key, row in self.stated.items() if key not in CONTROLLER}
 
     def understood(self, joints: Sequence[str]) -> Iterator[tuple[str, str, str]]:
-        """What the file states of drives, for people: what, how, and what told it."""
+        """What the file states of drives, for people: what, how, and the source."""
         for key, row in self.stated.items():
             values = [f"{row[joint]:.4g}" for joint in joints if joint in row]
             yield f"{key}", ", ".join(values), f"{self.stated_by or self.path.name}, where you state none"

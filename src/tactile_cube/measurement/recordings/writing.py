@@ -45,7 +45,7 @@ class RecordingTables:
     description: Description  # its trials come from the tables
     urdf: str  # the text
     tables: Sequence[TrialTable]
-    understood: Sequence[tuple[str, str, str]] = ()  # how an importer read files: what, how, and what told it
+    understood: Sequence[tuple[str, str, str]] = ()  # how an importer read files: what, how, and the source
 
 
 def write_recording(folder: Path, recording: RecordingTables) -> None:
@@ -137,7 +137,7 @@ def write_recordings(out: Path, parts: Mapping[str, RecordingTables]) -> None:
             if rows := tables.understood:
                 widths = [max(len(row[0]) for row in rows), max((len(row[1]) for row in rows if row[2]), default=0)]
                 lines = [f"  {what:<{widths[0]}}  {how:<{widths[1]}}  {by}".rstrip() for what, how, by in rows]
-                print("\n".join(["understood, and what told it:", *lines]))
+                print("\n".join(["columns as interpreted, and why:", *lines]))
             recording = _written(aside / name, tables, out / name)
             seconds = sum(trial.duration for trial in recording.trials)
             kinds = ", ".join(dict.fromkeys(trial.kind for trial in recording.trials))

@@ -59,7 +59,7 @@ class Unit:
 
     name: str
     size: float  # in SI units
-    source: str  # what told it
+    source: str  # where the unit was found
     zero: float = 0.0  # the reading that is zero
     doubt: str = ""  # what nothing proves
 
