@@ -205,3 +205,11 @@ def test_what_comes_to_a_set_that_is_complete_has_to_take_away_most_of_the_rest(
     verdict = decide(findings(90.0, alone, both))
     assert len(verdict.chosen.effects) == named
     assert verdict.kind == ("partly_explained" if named == 1 else "missing_effect")
+
+
+def test_where_a_chain_of_sets_refutes_all_of_them_the_best_one_stands() -> None:
+    """Two laws take 0.83 of the rest of one, three 0.83 of theirs, but three take most of what one leaves."""
+    one, two, three = (explanation("backlash", np.sqrt(1.0 + rest), 90.0) for rest in (90.0, 15.0, 2.5))
+    more, most = explanation("torque_gain", 2.0).effects, explanation("torque_bias", 2.0).effects
+    two, three = (replace(e, effects=(*e.effects, *added)) for e, added in ((two, more), (three, (*more, *most))))
+    assert sound([one, two, three], findings(90.0).base) == [three]

@@ -194,7 +194,7 @@ class Diagnosis:
         return tuple(self.findings.unproven(self.criteria)[:UNPROVEN]) if self.verdict.kind in NOT_ALL else ()
 
     def errors(self) -> ModelErrors:
-        """The error of each stage as the model file and diagnosis.json state it [rad]."""
+        """Return the error of each stage for the model file and diagnosis.json [rad]."""
         overall = {stage: summary.overall for stage, summary in self.stages.items()}
         joints = {stage: summary.joints for stage, summary in self.stages.items()}
         over_noise = self.over_noise["with_effects"]
@@ -281,11 +281,11 @@ def diagnose_recording(
 def no_worse(
     verdict: Verdict, standard: StandardModel, search: Search, simulations: Simulations, untouched: HeldOut
 ) -> Verdict:
-    """The verdict, with the standard model in the place of what does not beat it on untouched trials.
+    """Return the verdict, or the standard model if the verdict does not beat it on untouched trials.
 
-    A law that is the whole may differ in detail from the real thing, and is the better answer. Of two that leave
-    something the one with fewer numbers is recommended, unless the other earns the price of an effect. Where the
-    refitted constants leave the noise alone nothing is recommended beside them, and none is needed.
+    A complete explanation may be worse by `criteria.detail` of the squared error, as its law may differ from the true
+    one in detail. A partial one must be better by `criteria.least_gain` if it has more parameters than the standard
+    model, and may be worse by as much otherwise. A verdict of `adequate` needs no effects and is kept.
     """
     if verdict.kind == "adequate" or standard.fit is None:
         return verdict
@@ -303,10 +303,10 @@ def no_worse(
 
 
 def in_steps(recording: Recording, effects: Sequence[type[Effect]], known: ModelFile | None, say: Say) -> Recording:
-    """The recording in the steps of simulation that its sensors call for.
+    """Return the recording with the simulation steps that its sensors require.
 
     Raises:
-        InputError: gains and inertias call for more steps than any search can make.
+        InputError: gains and inertias require more than `MOST_STEPS` steps per row.
     """
     fine = resolved(recording, effects, say, known)
     steps = steps_per_row(fine, joint_scales(fine)[0].time)
@@ -320,7 +320,7 @@ def in_steps(recording: Recording, effects: Sequence[type[Effect]], known: Model
 
 
 def open_fits(diagnosis: Diagnosis) -> dict[str, Fit]:
-    """The chosen model and those that may be true as well: its rivals, or else what these trials do not prove."""
+    """Return the fits of the chosen model and of its rivals, or without rivals, of the unproven explanations."""
     chosen = diagnosis.verdict.chosen
     fits = {chosen.label if chosen.effects else "none of them": diagnosis.fitted.fit}
     if diagnosis.rivals:
@@ -350,7 +350,7 @@ def test_errors(
 
 
 def write_experiment(diagnosis: Diagnosis, folder: Path) -> Path | None:
-    """The command file of the next experiment, if one is needed."""
+    """Write the command file of the next experiment if one decides; return its path."""
     experiment = diagnosis.experiment
     return experiment.write(folder) if experiment and experiment.decides else None
 

@@ -19,7 +19,7 @@ RANKED = 20
 
 
 def as_json(diagnosis: Diagnosis, seconds: float) -> dict[str, Any]:
-    """The content of diagnosis.json; errors in rad."""
+    """Return the content of diagnosis.json, with errors in [rad]."""
     verdict, experiment = diagnosis.verdict, diagnosis.experiment
     explanations = [(verdict.chosen, diagnosis.fitted), *diagnosis.rivals]
     effects = effect_entries(explanations)
@@ -69,7 +69,7 @@ def as_json(diagnosis: Diagnosis, seconds: float) -> dict[str, Any]:
 
 
 def safety_as_json(experiment: Experiment) -> dict[str, Any]:
-    """What the proposed command, or the one nearest to the limits, does at most, and what it may do."""
+    """Return the largest values of the proposed command, or of the one nearest to the limits, and their bounds."""
     safety = experiment.safety
     envelopes = {"reached": safety.reached, "stop_beyond": safety.allowed, "limit": safety.limits.largest}
     return {
@@ -93,7 +93,7 @@ def safety_as_json(experiment: Experiment) -> dict[str, Any]:
 
 
 def ranking(findings: Findings, criteria: Criteria) -> list[dict[str, Any]]:
-    """What was judged: refitted explanations with held-out errors, then laws of the first look."""
+    """Return the refitted explanations with held-out errors, then the best candidates of the screening."""
     rows: dict[str, dict[str, Any]] = {}
     for one in findings.proven(criteria):
         numbers = {"gain": round(one.gain, 5), "p_value": one.p_value}
@@ -116,7 +116,7 @@ def names_of(explanation: Explanation) -> list[str]:
 
 
 def effect_entries(explanations: Sequence[tuple[Explanation, Fitted]]) -> list[dict[str, Any]]:
-    """The effects of the chosen explanation and of its rivals, each with what cannot be told from it."""
+    """Return the effects of the chosen explanation and its rivals, each with those it is not separable from."""
     entries = []
     for one, fitted in explanations:
         known, first = bounds(fitted), len(fitted.model.terms) - one.terms

@@ -106,7 +106,7 @@ def _by_trial(problem: Problem, errors: Array, trials: int) -> list[Array]:
 
 
 def _shared(own: Array, place: int, others: Sequence[tuple[Array, int]], rows: int) -> bool:
-    """Whether another run of the same command fails about then too, at the joint that fails most."""
+    """Return whether another run of the same command also fails at about that time, at the joint with most error."""
     joint = int(np.nanargmax(own[place]))
     for errors, lag in others:
         there = place - round(lag / rows)
@@ -174,10 +174,10 @@ def _fitted(recording: Recording, effects: Sequence[type[Effect]], known: ModelF
 def _late_beside_effects(
     recording: Recording, rows: int, effects: Sequence[type[Effect]], known: ModelFile | None
 ) -> bool:
-    """Whether earlier commands explain much that no effect does.
+    """Return whether earlier commands clearly reduce the error that the best single effect leaves.
 
-    A controller that integrates or knows its command's speed, and a spring, seem to know their commands early too,
-    whether somebody asks for them or not.
+    Integral action or velocity feed-forward of a controller, and a spring, also make a machine seem to move before its
+    command, so the catalogue's effects are included, requested or not.
     """
     effects = tuple(dict.fromkeys((*effects, *catalogue().values())))
     as_logged = _beside_an_effect(recording, effects, known)

@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 
 def _said(silent: float, unit: str) -> Any:
-    """A number that may be left out: the value that says nothing, and what it is in."""
+    """Return a field of the drive: its default, which has no effect, and its unit."""
     return field(default=silent, metadata={"unit": unit})
 
 
@@ -125,14 +125,14 @@ def _drive(model: ModelFile, joint: str, effects: list[EffectEstimate]) -> Joint
 
 
 def _told(estimate: Estimate, neutral: float | None) -> str:
-    """The number, or nothing where it, or what it may be, is the neutral one."""
+    """Return the value with its unit, or nothing if its interval contains the neutral value."""
     if neutral is not None and estimate.low <= neutral <= estimate.high:
         return ""
     return f"{estimate.value:.6g} {estimate.unit}".rstrip()
 
 
 def _held(drive: JointDrive, effect: str, p: Mapping[str, float]) -> tuple[tuple[str, ...], dict[str, Any]]:
-    """The parameters of an effect that attributes hold, and these attributes then."""
+    """Return the parameters of an effect that attributes of the drive hold, and the new values of the attributes."""
     if effect in ADDED:
         key, name = ADDED[effect]
         return (key,), {name: getattr(drive, name) + p[key]}
@@ -244,7 +244,7 @@ def as_mjcf(model: ModelFile, recording: Recording) -> tuple[str, list[str]]:
 
 
 def _is_servo(drive: JointDrive) -> bool:
-    """Whether only MuJoCo's `dcmotor` has what limits its position controller."""
+    """Return whether the limits of the position controller need MuJoCo's `dcmotor`."""
     return isfinite(drive.stall) or isfinite(drive.rate)
 
 
@@ -321,7 +321,7 @@ def _actuator(drive: JointDrive, mode: Mode, step: float) -> str:
 
 
 def _motor(constant: float, torque: float) -> str:
-    """A motor's constant [V s/rad], and the resistance at which a volt makes so much torque at standstill [N m]."""
+    """Return a motor's constant [V s/rad] and the resistance for which one volt gives the torque at rest [N m]."""
     return f'motorconst="{constant:.12g}" resistance="{constant / torque:.12g}"'
 
 

@@ -46,7 +46,7 @@ class Identification:
     held_out: list[str]
 
     def errors(self) -> ModelErrors:
-        """The error of each stage as the model file states it [rad]."""
+        """Return the error of each stage for the model file [rad]."""
         return ModelErrors(
             nominal=self.stages["nominal"].overall,
             refitted=self.stages["refitted"].overall,
@@ -105,7 +105,7 @@ def identify_effects(
 
 
 def _no_worse(search: Search, before: Fit, added: Model) -> Fit:
-    """Everything refitted with an effect more; where held-out trials are followed worse, what went before as it was."""
+    """Refit all unknowns with an effect added; if held-out trials get worse, return the better of old and new."""
     unknowns = search.unknowns(added)
     found = fit(search.problem, added, unknowns, iterations=4)
     if not search.free_runs.worse(found.model, before.model):
@@ -115,7 +115,7 @@ def _no_worse(search: Search, before: Fit, added: Model) -> Fit:
 
 
 def judge_known(recording: Recording, model: ModelFile, seed: int = 0) -> Judgement:
-    """How an identified model does, none of its numbers refitted, on the trials that `identify` would hold out.
+    """Judge an identified model, without a refit, on the trials that `identify` would hold out.
 
     Args:
         recording: two or more trials, of the model's joints.

@@ -27,7 +27,7 @@ HELD = "Nothing is missing that these grasps show: the world follows them about 
 
 
 def answer(result: dict[str, Any], experiment: Experiment | None, constants: Sequence[str] = ()) -> str:
-    """A few lines for the terminal, from the content of diagnosis.json; `constants` are said to be stated otherwise."""
+    """Return the content of diagnosis.json as lines for the terminal; `constants`: those unlike their stated values."""
     units = result.get("shown_in", result.get("units", {}))
     grasps, unproven = result.get("noise_floor_source") == "contact", result.get("unproven_effects")
     opening = headline(result)
@@ -87,13 +87,13 @@ def restated(recording: Recording, model: ModelFile) -> list[str]:
 
 
 def error_of(result: Mapping[str, Any]) -> str:
-    """Of which trials the errors are that a result states."""
+    """Return the label of the reported errors: on test trials or held-out trials."""
     tested = result.get("tested")
     return f"Error on {len(tested)} test trials, used neither to fit nor to select" if tested else "Held-out error"
 
 
 def headline(result: Mapping[str, Any]) -> str:
-    """The answer in a sentence."""
+    """Return the verdict as a sentence."""
     if result["verdict"] == "unknown_effect" and result.get("partial_effects"):
         return PARTIAL
     shares = [one.get("black_box", 1.0) for one in result.get("unexplained", [])]
@@ -105,7 +105,7 @@ def headline(result: Mapping[str, Any]) -> str:
 
 
 def left_over(result: Mapping[str, Any]) -> str:
-    """What the effects that are named leave, where that is no noise."""
+    """Describe the error that remains with the named effects, if it is above the noise."""
     error = result["error"]
     if result["verdict"] in ("adequate", "unknown_effect") or not error.get("noise_floor"):
         return ""
@@ -118,12 +118,12 @@ def left_over(result: Mapping[str, Any]) -> str:
 
 
 def sets_in_words(sets: Sequence[Sequence[str]]) -> str:
-    """Sets of effects that explain a recording alike: `backlash@q1 and payload@q2, or elasticity@q1`."""
+    """List sets of effects that explain a recording equally: `backlash@q1 and payload@q2, or elasticity@q1`."""
     return ", or ".join(" and ".join(names) for names in sets)
 
 
 def values_in_words(parameters: Mapping[str, Mapping[str, Any]], unit: str) -> str:
-    """Values with intervals, at a joint of that unit."""
+    """Return the values with intervals as text, for a joint of that unit."""
     return ", ".join(
         f"{name} {one['value']:.4g} [{one['low']:.4g}, {one['high']:.4g}] {of_joint(one['unit'], unit)}"
         for name, one in parameters.items()
@@ -167,7 +167,7 @@ def unproven_effects(entries: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def common_offset(entry: Mapping[str, Any], units: Mapping[str, str]) -> str:
-    """A joint offset that all initialisations have, and what would tell where it comes from."""
+    """Describe a joint offset that all initialisations share, and how to find its source."""
     offset = milli(entry["offset"], units.get(entry["joint"], TURNS))
     return (
         f"{entry['joint']} reads about {offset} too much in each of {entry['initialisations']} "
@@ -176,7 +176,7 @@ def common_offset(entry: Mapping[str, Any], units: Mapping[str, str]) -> str:
 
 
 def disturbed(result: Mapping[str, Any]) -> list[str]:
-    """The intervals that follow no model, left out or suspected, and what to do about them."""
+    """Describe the intervals that follow no model, left out or suspected, and what to do about them."""
     lines = []
     for key, opening in (("left_out", "Left out"), ("suspected", "Not left out")):
         for one in result.get(key, []):
@@ -193,7 +193,7 @@ def disturbed(result: Mapping[str, Any]) -> list[str]:
 
 
 def unseen_effects(result: Mapping[str, Any]) -> list[str]:
-    """What no trial could show, an effect a line."""
+    """List the effects that no trial could reveal, one per line."""
     joints: dict[str, list[str]] = {}
     for one in result.get("unseen", []):
         joints.setdefault(one["effect"], []).append(f"{one['joint']} ({one['why']})")
@@ -201,7 +201,7 @@ def unseen_effects(result: Mapping[str, Any]) -> list[str]:
 
 
 def errors_by_stage(stages: Mapping[str, float], model: ModelFile, units: Mapping[str, str]) -> str:
-    """How the held-out error fell, and the values of the effects that were fitted."""
+    """List the held-out error of each stage, and the values of the fitted effects."""
     unit = common_unit(units.values())
     lines = ["Held-out error, free-running simulation:"]
     lines += [f"  {stage.replace('_', ' '):<40} {milli(value, unit)}" for stage, value in stages.items()]
@@ -216,7 +216,7 @@ PLENTY = 100.0  # times the evidence that is needed: how much more is of no use 
 
 
 def next_steps(experiment: Experiment, units: Mapping[str, str]) -> list[str]:
-    """What to play to decide, when to stop it, and between what nothing that can be played decides."""
+    """Describe the command to play, when to stop it, and the explanations that no command separates."""
     beyond = "stop beyond" if experiment.safety.safe else "allowed"
     lines = [
         f"  {joint}: {position}, {speed}, {torque}; {beyond} {', '.join(bounds)}"
@@ -226,7 +226,7 @@ def next_steps(experiment: Experiment, units: Mapping[str, str]) -> list[str]:
 
 
 def proposal(experiment: Experiment) -> list[str]:
-    """What to play, or that nothing is safe or nothing decides."""
+    """Describe the command to play, or state that no command is safe or decides."""
     safety, seconds = experiment.safety, _seconds(experiment)
     size = "" if safety.scale == 1.0 else f" at {_percent(safety.scale)} of full size"
     command = f"{experiment.name}{size}, {seconds}"
@@ -272,7 +272,7 @@ def joint_rows(experiment: Experiment, units: Mapping[str, str]) -> list[tuple[s
 
 
 def watch_for(experiment: Experiment, units: Mapping[str, str]) -> list[str]:
-    """What to watch for; what would help where nothing is safe, or nothing that is safe decides."""
+    """Describe what to watch for, or what would help if no command is safe or no safe command decides."""
     safety = experiment.safety
     if not experiment.decides:
         unstated = [key for key in QUANTITIES if TRIALS in safety.limits.sources[key]]

@@ -29,7 +29,7 @@ Known = Mapping[tuple[str, str, int, int], tuple[float, float, float]]
 def model_file(
     recording: Recording, fitted: Fitted, errors: ModelErrors, held_out: list[str], command: str, seed: int
 ) -> ModelFile:
-    """Everything that was identified on a recording; an offset is measured minus true, over all initialisations."""
+    """Return the model file of an identification; an offset is measured minus true, over all initialisations."""
     known, model, offsets = bounds(fitted), fitted.model, dict[str, Estimate]()
     for j, joint in enumerate(recording.joints):
         found = [-float(one[j]) for one in model.offsets.values()]
@@ -52,7 +52,7 @@ def model_file(
 
 
 def stated_model(recording: Recording, command: str, seed: int) -> ModelFile:
-    """What recording.yaml says of the drivetrain, as a model without intervals; it is silent where the recording is."""
+    """Return the drivetrain that recording.yaml states as a model without intervals; omit unstated constants."""
     every = nominal_model(recording).constants
     values = {
         key: {joint: _estimate(float(v), None, "") for joint, v in zip(recording.joints, row, strict=True)}
@@ -76,7 +76,7 @@ def _provenance(recording: Recording, held_out: list[str], command: str, seed: i
 
 
 def effect_estimate(term: Term, place: int, known: Known) -> EffectEstimate:
-    """An effect with every parameter; those that were not fitted have no width."""
+    """Return an effect with every parameter; those not fitted have an interval of zero width."""
     units = {p.name: p.unit for p in term.effect.parameters}
     parameters = {
         key: _estimate(value, known.get(("effect", key, place, 0)), units[key]) for key, value in term.values.items()
@@ -121,9 +121,9 @@ class Drift:
 
 
 def drifts(before: ModelFile, now: ModelFile) -> list[Drift]:
-    """Every number with an interval in both models, the least probable difference first.
+    """Return the change of each parameter with an interval in both models, smallest p-value first.
 
-    Joint offsets are left out: they are others after each initialisation of a robot.
+    Joint offsets are left out: they change at each initialisation of a robot.
     """
     known, found = ({name: one for name, one in _estimates(model) if one.high > one.low} for model in (before, now))
     pairs = [Drift(name, known[name], one) for name, one in found.items() if name in known]
@@ -131,7 +131,7 @@ def drifts(before: ModelFile, now: ModelFile) -> list[Drift]:
 
 
 def changed(found: list[Drift], significance: float) -> list[Drift]:
-    """Those that are no chance; `significance` holds for all of them together (Bonferroni)."""
+    """Return the significant changes; `significance` holds for all of them together (Bonferroni)."""
     return [one for one in found if one.p_value * len(found) < significance]
 
 

@@ -78,16 +78,16 @@ def next_experiment(
     criteria: Criteria = STANDARD,
     extended: bool = False,
 ) -> Experiment:
-    """The excitation that tells most between the first explanation and the one hardest to tell from it.
+    """Choose the excitation that best separates the first explanation from the one hardest to distinguish from it.
 
     Args:
         shooting: simulates the explanations.
         recording: what has been played so far.
         rivals: explanations and their fits on the recording, two or more; the first is compared with each other one.
         noise: (n,) of the position sensors [rad].
-        seed: of the commands' phases.
-        criteria: what decides between two explanations.
-        extended: the others are the first one and one more effect, so that only its visibility counts.
+        seed: seed of the commands' phases.
+        criteria: thresholds that decide between two explanations.
+        extended: the others are the first one with one more effect, so that only its visibility counts.
     """
     motions = PossibleMotions(shooting, recording, list(rivals.values()), criteria.margin)
     proposed = motions.safe_trials(seed)
@@ -168,7 +168,7 @@ def _told(
 
 
 def _known(trials: Recording, fitted: Fit, sizes: Mapping[str, Scales]) -> tuple[tuple[Unknown, ...], Array]:
-    """The unknowns of a fit, with joint offsets of new trials for its own, and the information (P, P) on them."""
+    """Return the unknowns of a fit, its joint offsets replaced by those of new trials, and their information (P, P)."""
     offsets = offset_unknowns(trials, sizes)
     covariance, others = covariance_of_numbers(fitted)
     known = block_diag(np.linalg.pinv(covariance), np.diag(precision(offsets)))
@@ -176,7 +176,7 @@ def _known(trials: Recording, fitted: Fit, sizes: Mapping[str, Scales]) -> tuple
 
 
 def _measured(trial: Trial, positions: Array) -> Trial:
-    """A trial as a model predicts it (T, n); where its simulation ran away nothing is measured."""
+    """Return a trial with the positions (T, n) that a model predicts; rows are invalid where it ran away."""
     valid = np.asarray(np.isfinite(positions).all(axis=1))
     return replace(trial, position=np.where(valid[:, None], positions, trial.position), valid=valid)
 

@@ -42,13 +42,13 @@ class Envelope:
 
     @classmethod
     def of_motion(cls, position: Array, torque: Array, step: float) -> Envelope:
-        """The envelope of positions (T, n) [rad] and torques (T, n) [N m], with rows every `step` [s]."""
+        """Return the envelope of positions (T, n) [rad] and torques (T, n) [N m], with rows every `step` [s]."""
         speed = np.abs(np.diff(position, axis=0)).max(axis=0) / step
         return cls(position.min(axis=0), position.max(axis=0), speed, np.abs(torque).max(axis=0))
 
     @classmethod
     def around(cls, envelopes: Iterable[Envelope]) -> Envelope:
-        """The smallest envelope that holds all of them."""
+        """Return the smallest envelope that contains all of them."""
         low, high, speed, torque = (
             np.array(rows) for rows in zip(*((e.low, e.high, e.speed, e.torque) for e in envelopes), strict=True)
         )
@@ -60,7 +60,7 @@ class Envelope:
         return 0.5 * (self.low + self.high), 0.5 * (self.high - self.low)
 
     def of_joint(self, joint: int) -> dict[str, float | None]:
-        """The plain numbers of one joint; None where a simulation ran away."""
+        """Return the values of one joint as floats; None where a simulation ran away."""
         numbers = {key: float(getattr(self, key)[joint]) for key in ("low", "high", "speed", "torque")}
         return {key: value if np.isfinite(value) else None for key, value in numbers.items()}
 
@@ -78,7 +78,7 @@ class Limits:
     sources: dict[str, tuple[str, ...]]
 
     def allowed(self, margin: float) -> Envelope:
-        """The limits less a margin, a part of each one that somebody states; trials have shown theirs to be safe."""
+        """Return the limits less a margin, a share of each stated limit; limits from trials are safe and have none."""
         position, speed, torque = (
             1.0 - margin * np.array([source != TRIALS for source in self.sources[key]]) for key in QUANTITIES
         )
@@ -87,7 +87,7 @@ class Limits:
 
 
 def share_used(reached: Envelope, allowed: Envelope) -> float:
-    """The largest part of what is allowed that a motion uses; infinite where a simulation ran away."""
+    """Return the largest share of the allowed envelope that a motion uses; infinite where a simulation ran away."""
     middle, half = allowed.middle_and_half
     used = np.array([np.abs(reached.low - middle), np.abs(reached.high - middle), reached.speed, reached.torque])
     largest = float(np.max(used / np.maximum([half, half, allowed.speed, allowed.torque], np.finfo(float).tiny)))
@@ -95,12 +95,12 @@ def share_used(reached: Envelope, allowed: Envelope) -> float:
 
 
 def within_limits(reached: Envelope, limits: Limits, margin: float) -> bool:
-    """Whether a motion stays within the limits less the margin."""
+    """Return whether a motion stays within the limits less the margin."""
     return share_used(reached, limits.allowed(margin)) <= 1.0 + ROUNDING
 
 
 def limits_of(recording: Recording) -> Limits:
-    """The limits that URDF and controller state, and where they state none what the trials reached."""
+    """Return the limits of URDF and controller, or where neither states one, the largest values of the trials."""
     kp, driven = recording.gains.kp, recording.torque_controlled
     shown = Envelope.around(
         Envelope(
@@ -164,7 +164,7 @@ def excitations(recording: Recording, seed: int, unit: float = 1.0) -> dict[str,
 
 
 def middle_command(recording: Recording) -> Array:
-    """The command (n,) about which to move: mid-range, or the torque that carries the links where they begin."""
+    """Return the command (n,) to move about: mid-range, or the torque that holds the links where they start."""
     if not recording.torque_controlled:
         everything = np.concatenate([trial.command for trial in recording.trials])
         return np.asarray(0.5 * (everything.min(axis=0) + everything.max(axis=0)))
@@ -255,9 +255,9 @@ class PossibleMotions:
         self.ends = [[model.with_offsets(zero) for model in interval_ends(fit)] for fit in fits]
 
     def safe_trials(self, seed: int) -> list[tuple[Trial, Safety]]:
-        """Each excitation at the largest scale at which it stays within the limits, or the least of all.
+        """Return each excitation at the largest scale within the limits, or at the smallest scale if none is safe.
 
-        Where the least is not safe, those in between are not asked for.
+        If the smallest scale is not safe, the scales in between are not simulated.
         """
         middle, found = middle_command(self.recording), []
         for kind, commands in excitations(self.recording, seed, self.shooting.time).items():
@@ -274,7 +274,7 @@ class PossibleMotions:
         return found
 
     def safety(self, kind: str, commands: Array, scale: float = 1.0) -> Safety:
-        """What commands (T, n) do from rest, simulated freely until they end or a model leaves the limits."""
+        """Simulate commands (T, n) from rest until they end or a model leaves the limits, and return their safety."""
         trials = trials_from_rest(self.recording, kind, commands)
         low, high, still = commands.min(axis=0), commands.max(axis=0), np.zeros(commands.shape[1])
         reached = Envelope(low, high, still, still)
@@ -289,7 +289,7 @@ class PossibleMotions:
         return Safety(self.limits, self.margin, reached, scale, count, starts, open_loop)
 
     def _simulated(self, trials: Sequence[Trial]) -> Iterator[Envelope]:
-        """What each model does, fitted ones in every trial; positions as the sensors read them and as they are."""
+        """Yield the envelope of each model, of fitted ones in every trial; it includes read and true positions."""
         last = trials[-1]
         batches = [*((self.fits, trial) for trial in reversed(trials)), *((models, last) for models in self.ends)]
         for models, trial in batches:

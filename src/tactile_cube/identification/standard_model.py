@@ -58,9 +58,9 @@ BY_DIRECTION: Laws = {
 
 
 def spreads(scales: Scales) -> dict[str, float]:
-    """How far each number may be from what is stated, as a standard deviation.
+    """Return the standard deviation of each parameter about its stated value.
 
-    Masses come from scales, torque constants and rotors come from data sheets, friction is a part of the usual torque.
+    Masses are measured on scales, torque constants and rotors come from data sheets, friction is a share of the torque.
     """
     torque, damping = scales.torque, scales.torque / scales.speed
     return {
@@ -105,7 +105,7 @@ class StandardModel:
         return tuple(t.label for k, t in enumerate(self.model.terms) if k >= first and sure.get(k, 0.0) > 1.0)
 
     def sentence(self, unit: str) -> str:
-        """The first answer, for the terminal; `unit` of the positions: rad or m."""
+        """Return the first result as a line for the terminal; `unit` of the positions: rad or m."""
         stated = f"held-out error {milli(self.stated_error, unit)} as stated"
         if self.fit is None:
             return f"{stated}; the standard model does no better"
@@ -146,7 +146,7 @@ class _Fitting:
     judge: HeldOut
 
     def run(self) -> StandardModel:
-        """The plain model in growing windows, by direction too where that is better, then what of it is needed."""
+        """Fit the plain model in growing windows, add laws by direction if better, then remove effects not needed."""
         stated = self.judge.error(self.start)
         best = _Tried(self.start, stated)
         for laws, gain in ((PLAIN, 0.0), (BY_DIRECTION, STANDARD.detail)):
@@ -157,7 +157,7 @@ class _Fitting:
         return StandardModel(best.model, best.fit, self.added(best.model), best.half_width, stated, best.error)
 
     def grown(self, before: _Tried, laws: Laws, gain: float) -> _Tried:
-        """The best fit with these laws too, in windows that grow or those that did best; else what it was before."""
+        """Fit these laws too, in growing windows or those of the previous fit; return that fit if none is better."""
         best, model = before, self.with_laws(before.model, laws)
         longest = max(len(trial.time) for trial in self.recording.trials)
         growing = [self.rows_of(seconds) for seconds in WINDOWS]
@@ -170,11 +170,11 @@ class _Fitting:
         return best
 
     def rows_of(self, seconds: float) -> int:
-        """How many rows a window of so long has, of a finger or of what is as slow in proportion."""
+        """Return the rows of a window of so many seconds at a finger, scaled to the machine's time."""
         return round(seconds * self.shooting.time / self.recording.step)
 
     def robust(self, model: Model, rows: int, rounds: int = ROUNDS) -> _Tried:
-        """A fit in windows of so many rows with a soft-L1 loss, by weights that are taken anew."""
+        """Fit in windows of so many rows with a soft-L1 loss, by iterative reweighting."""
         segments = max(
             1, round(LONGEST_FITTED * self.shooting.time / (len(self.recording.joints) * rows * self.recording.step))
         )
@@ -189,7 +189,7 @@ class _Fitting:
         return _Tried(model, self.judge.error(model), rows, found, half_width)
 
     def weighted(self, windows: Windows, model: Model) -> Problem:
-        """The problem of windows in which a model's errors count as a soft-L1 loss weighs them."""
+        """Return the problem of windows, weighted by a soft-L1 loss of a model's errors."""
         problem = Problem(self.shooting, windows)
         error = np.abs(problem.limited(problem.measured - problem.predictions([model])[0]))
         weight = windows.weight * np.sqrt(soft_l1(error, problem.weight)).reshape(windows.weight.shape)
@@ -206,7 +206,7 @@ class _Fitting:
         return self.without(fewer, needless(fewer, len(self.start.terms))) if fewer is not best else best
 
     def without(self, best: _Tried, labels: set[str]) -> _Tried:
-        """The model refitted without some effects; as it was where that is worse."""
+        """Refit the model without some effects; return it unchanged if that is worse."""
         if not labels:
             return best
         first = len(self.start.terms)
@@ -216,14 +216,14 @@ class _Fitting:
         return fewer if fewer.error**2 <= (1.0 + STANDARD.detail) * best.error**2 else best
 
     def added(self, model: Model) -> tuple[Candidate, ...]:
-        """The effects of a model beyond what is known."""
+        """Return the effects of a model that the start model does not have."""
         return tuple(
             Candidate(t.effect, (t.joint,), {key: t.values[key] for key in t.fitted}, self.shooting.sizes)
             for t in model.terms[len(self.start.terms) :]
         )
 
     def with_laws(self, model: Model, laws: Laws) -> Model:
-        """The model with these laws at every joint, those that it has with more of their numbers free."""
+        """Return the model with these laws at every joint; for laws it already has, free these parameters too."""
         for name, parameters in laws.items():
             for joint in self.recording.joints:
                 model = with_law(model, find_effect(name), joint, parameters, self.shooting.sizes[joint])
@@ -278,7 +278,7 @@ def certainties(model: Model, found: Fit, half_width: Array) -> dict[int, float]
 
 
 def with_law(model: Model, effect: type[Effect], joint: str, parameters: tuple[str, ...], scales: Scales) -> Model:
-    """The model with numbers of an effect free, expected as stated, in which they change nothing as yet."""
+    """Return the model with parameters of an effect free, expected as stated and neutral where they are new."""
     own = effect.parameters_at(scales)
     expected = {key: (own[key].neutral, spreads(scales)[f"{effect.name}.{key}"]) for key in parameters}
     for place, term in enumerate(model.terms):

@@ -73,7 +73,7 @@ def closest(found: Sequence[Explanation], findings: Findings, criteria: Criteria
 def find_rivals(
     chosen: Explanation, found: Sequence[Explanation], criteria: Criteria = STANDARD
 ) -> tuple[Explanation, ...]:
-    """Sets of as few effects and numbers within the band of the chosen one, but for laws that contain it or a rival."""
+    """Return sets of as few effects and parameters in the band of the chosen one, containing neither it nor a rival."""
     rivals: dict[frozenset[tuple[str, str]], Explanation] = {}
     for other in sorted(found, key=lambda e: e.judgement.costs.sum()):
         other_law = named(other) != named(chosen) and len(named(other)) <= len(named(chosen))
@@ -121,7 +121,7 @@ class Simulations:
         self._final: dict[str, Fitted] = {}
 
     def final(self, one: Explanation) -> Fitted:
-        """An explanation with intervals, refitted on all fitted trials unless held-out ones are followed worse then."""
+        """Refit an explanation on all fitted trials, with intervals; keep its values if held-out trials get worse."""
         if one.label not in self._final:
             unknowns = self.search.unknowns(one.fit.model)
             found = final_fit(self.problem, one.fit.model, unknowns)
@@ -131,9 +131,9 @@ class Simulations:
         return self._final[one.label]
 
     def unexplained(self, one: Explanation, beside_base: bool = False) -> list[Unexplained]:
-        """What is left at each joint that is not explained; `beside_base`, also beside the base model.
+        """Return the missing torque of each unexplained joint; `beside_base`: also beside the base model.
 
-        Effects that help and are not the cause blur the shape of what is missing.
+        Effects that reduce the error without being the cause blur the shape of the missing torque.
         """
         search, found = self.search, list[Unexplained]()
         joints = unexplained_joints(one, search.fitted.joints, search.criteria)

@@ -70,7 +70,7 @@ class Grasp:
         self._known: dict[frozenset[tuple[str, str, float]], tuple[Array, Array]] = {}
 
     def fitted(self, contact: ContactModel) -> tuple[Array, Array]:
-        """What suits a contact best, and what it leaves; simulated once for each contact.
+        """Return the offsets and displacement that fit a contact best, and their residual; simulate once per contact.
 
         Offsets [rad] and displacement [m] in the rig's frame, (joints + 3,), and measured minus simulated position (n,
         joints) [rad].
@@ -194,10 +194,10 @@ class Grasps(Problem):
         return float(self.cost(self.residual(self.prediction(model))).sum())
 
     def judged(self, model: Model) -> Judgement:
-        """How a model does on each joint of each trial, and by what each initialisation needs of offsets and place.
+        """Judge a model by its error per joint and trial, and by the offsets and displacement of each initialisation.
 
-        The world's own error counts as if it came on top. An offset needs no more than is expected of it; their error
-        stands behind those of the joints, as one more.
+        A joint's cost includes the error that the world itself leaves. Offsets and displacements of the expected size
+        have an error of one; their common error follows those of the joints as one more entry.
         """
         residual, joints = self.residual(self.prediction(model)), self.joints
         samples, squares = self._counts.copy(), self._sums(residual**2)
@@ -225,7 +225,7 @@ class Grasps(Problem):
         return [one.fitted(contact) for one in self.grasps]
 
     def _padded(self, rows: Sequence[Array]) -> Array:
-        """Rows as one array; numbers of what nobody knows of a grasp come last."""
+        """Return rows of different length as one array; the offsets and displacement of a grasp come last."""
         last = self.joints + 3
         found = np.zeros((len(rows), max(map(len, rows))))
         for one, row in zip(found, rows, strict=True):
@@ -258,7 +258,7 @@ class OpenGrasps:
     finer: Callable[[Grasps], Grasps]
 
     def without(self, effects: Sequence[type[ContactEffect]]) -> Model:
-        """The contact as the model has it, but for these effects."""
+        """Return the contact of the start model without these effects."""
         return replace(self.start, terms=tuple(term for term in self.start.terms if term.effect not in effects))
 
 

@@ -49,7 +49,7 @@ SURER: tuple[Kind, ...] = ("unknown_effect", "partly_explained", "ambiguous", "m
 
 
 def stepped(problem: Grasps, parent: Model, effect: type[ContactEffect]) -> tuple[Candidate, Fit]:
-    """An effect beside a contact, from the start that suits best, after a step of its own."""
+    """Add an effect to a contact at its best start and fit its parameters by one Gauss-Newton step."""
     found = []
     for form in effect.starts_at(FINGER):
         candidate = Candidate(effect, (OBJECT,), form)
@@ -60,7 +60,7 @@ def stepped(problem: Grasps, parent: Model, effect: type[ContactEffect]) -> tupl
 
 
 def final(grasps: OpenGrasps, model: Model) -> Fitted:
-    """A contact refitted on all fitted trials, with intervals, unless held-out ones are followed worse then."""
+    """Refit a contact on all fitted trials, with intervals; keep its values if held-out trials are predicted worse."""
     problem = grasps.fitted
     problem.linearise_starts(model)
     fitted = fit(problem, model, model_unknowns(model), LAST_STEPS)
@@ -95,7 +95,7 @@ class ContactIdentification:
     held_out: list[str]
 
     def into(self, model: ModelFile, alone: bool) -> ModelFile:
-        """The model with these effects; `alone`: nothing else was identified, so its errors are these."""
+        """Return the model file with these effects; `alone`: nothing else was identified, so its errors are these."""
         effects = model.with_effects(self.effects())
         if not alone:
             return model.model_copy(update={"effects": effects})
@@ -115,7 +115,7 @@ class ContactIdentification:
         return {key: one.joints for key, one in self.stages.items()}
 
     def effects(self) -> list[EffectEstimate]:
-        """As the model file states them."""
+        """Return the estimates of the fitted effects for the model file."""
         known = bounds(self.fitted)
         return [
             effect_estimate(term, place, known) for place, term in enumerate(self.fitted.model.terms) if term.fitted
@@ -143,10 +143,10 @@ class ContactIdentification:
 
 
 def contact_effects(names: Sequence[str], recording: Recording) -> list[type[ContactEffect]]:
-    """The contact effects among names as a user writes them.
+    """Return the contact effects among the names of effects that a user gives.
 
     Raises:
-        InputError: one with a joint, or with a recording that has no object.
+        InputError: a contact effect with a joint, or with a recording that has no object.
     """
     chosen = [name for name in names if is_contact_effect(name)]
     for name in chosen:
@@ -215,12 +215,12 @@ class ContactSearch:
         self.base = Explanation((), start, self.validation.judged(grasps.start), 1.0, 0.0)
 
     def find(self) -> Findings:
-        """Everything that was tried, all laws of the catalogue counted."""
+        """Return all proposed sets, judged on held-out trials; every law of the catalogue counts as tested."""
         judged = tuple(self.explained(one) for one in self.proposed())
         return Findings(self.base, self.base.judgement, judged, looked=len(contact_catalogue()))
 
     def proposed(self) -> list[Proposal]:
-        """Sets by their fit alone."""
+        """Propose sets of effects by their fit alone: forward selection, then the selected set without each effect."""
         parent, found = Proposal((), self.base.fit), dict[frozenset[tuple[str, str]], Proposal]()
         most = self.criteria.floor
         while len(parent.effects) < MOST and self.problem.judged(parent.fit.model).joint_errors.max() > most:
@@ -238,7 +238,7 @@ class ContactSearch:
         return list(found.values())
 
     def grown(self, parent: Proposal) -> list[Proposal]:
-        """The parent with one law more: those that promise most by their own step, everything refitted."""
+        """Refit the parent with one more law, for each of the laws whose own step reduces the cost most."""
         known = {term.effect for term in parent.fit.model.terms}
         left = [effect for effect in contact_catalogue().values() if effect not in known]
         laws = sorted((stepped(self.few, parent.fit.model, effect) for effect in left), key=lambda one: one[1].cost)
@@ -248,7 +248,7 @@ class ContactSearch:
         return [self.refitted((*parent.effects, law), fitted.model) for law, fitted in laws]
 
     def refitted(self, effects: tuple[Candidate, ...], model: Model) -> Proposal:
-        """A set with everything free."""
+        """Refit a set of effects with all parameters free."""
         one = Proposal(effects, fit(self.problem, model, model_unknowns(model), STEPS))
         left = np.sqrt(one.fit.cost / self.base.fit.cost)
         said = (f"{term.effect.name} {_values(term.values)}" for term in one.fit.model.terms if term.fitted)
@@ -256,7 +256,7 @@ class ContactSearch:
         return one
 
     def explained(self, one: Proposal) -> Explanation:
-        """A fitted set on the held-out trials."""
+        """Judge a fitted set on the held-out trials."""
         judged = self.validation.judged(one.fit.model)
         chance = min(1.0, p_value(self.base.judgement, judged) * len(contact_catalogue()))
         return Explanation(one.effects, one.fit, judged, chance, gain(self.base.judgement, judged))
@@ -320,7 +320,7 @@ def diagnose_contact(
 
 
 def diagnosed(grasps: OpenGrasps, joints: Sequence[str], criteria: Criteria, say: Say) -> ContactDiagnosis:
-    """The same of grasps that are simulated by anything."""
+    """Diagnose grasps simulated by any world, as `diagnose_contact` does."""
     search = ContactSearch(grasps, criteria, say)
     findings = search.find()
     answer = decide(findings, criteria)
@@ -335,9 +335,9 @@ def diagnosed(grasps: OpenGrasps, joints: Sequence[str], criteria: Criteria, say
 
 
 def with_contact(result: Mapping[str, Any], found: ContactDiagnosis) -> dict[str, Any]:
-    """The content of diagnosis.json of a drivetrain, with what was found of fingertips and object.
+    """Return the content of diagnosis.json of a drivetrain with the diagnosis of fingertips and object added.
 
-    The errors stay those of free motion; those of the grasps stand under `contact`.
+    The errors remain those of free motion; those of the grasps are under `contact`.
     """
     contact = found.as_json()
     return {

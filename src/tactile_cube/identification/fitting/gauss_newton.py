@@ -96,7 +96,7 @@ def _linearised(
     frozen: Fit | None,
     step: float,
 ) -> Fit:
-    """A model with its derivatives, which are neighbours along its path."""
+    """Linearise the problem at a model; the derivatives are simulated as neighbours along its path."""
     prediction, fresh = problem.columns(model, unknowns, step)
     residual = problem.residual(prediction)
     columns = np.concatenate([frozen.columns, fresh], axis=-1) if frozen else fresh
@@ -107,7 +107,7 @@ def _linearised(
 
 
 def _evaluated(problem: Problem, near: Fit, model: Model) -> Fit:
-    """A model with the derivatives of one close to it: one simulation, exact."""
+    """Evaluate a model by one exact simulation; keep the derivatives of a fit close to it."""
     residual = problem.residual(problem.prediction(model))
     cost, penalty = float(problem.cost(residual).sum()), prior_penalty(model, near.unknowns)
     return replace(near, model=model, cost=cost, prior_penalty=penalty, residual=residual)
@@ -124,7 +124,7 @@ def noise_inflation(problem: Problem, cost: float) -> float:
 
 
 def renewed(problem: Problem, fitted: Fit, prediction: Array, columns: Array) -> Fit:
-    """A fit with residual, columns and information of a problem whose starts were linearised anew."""
+    """Return a fit with residual, columns and information of a problem whose starts were linearised again."""
     residual, information = problem.residual(prediction), _information(problem, columns)
     cost = float(problem.cost(residual).sum())
     return Fit(fitted.model, fitted.unknowns, cost, fitted.prior_penalty, residual, columns, information)

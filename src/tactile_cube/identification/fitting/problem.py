@@ -52,11 +52,11 @@ class Shooting(Simulator):
         trials: Sequence[Trial] | None = None,
         segment: int | None = None,
     ) -> Windows:
-        """The trials of a recording as windows of this machine's size, see `windows.cut`."""
+        """Cut the trials of a recording into windows of this machine's size, see `windows.cut`."""
         return cut(recording, noise, trials, segment, self.time, self.start_speed)
 
     def per_joint(self, unit: str) -> Array:
-        """How many times larger numbers of a unit are than at a finger, (n,)."""
+        """Return the size of values in a unit at each joint, relative to a finger's, (n,)."""
         return np.array([scales.of(unit) for scales in self.scales])
 
     def positions(self, models: Sequence[Model], windows: Windows, near: Path | None = None) -> Array:
@@ -64,7 +64,7 @@ class Shooting(Simulator):
         return self.simulate(models, [windows] * len(models), near=near)[:, 0]
 
     def positions_from(self, model: Model, initial_states: Sequence[Array], windows: Windows) -> Array:
-        """The same for one model from several `initial_state`s, (initial states, S, K segment, sensors) [rad]."""
+        """Simulate one model from several `initial_state`s, (initial states, S, K segment, sensors) [rad]."""
         begun = [replace(windows, initial_state=one) for one in initial_states]
         return self.simulate([model] * len(begun), begun)[:, 0]
 
@@ -114,13 +114,13 @@ class Problem:
         self._path: tuple[Model, Windows, Path] | None = None
 
     def path(self, model: Model) -> Path:
-        """The model's way through the windows, the last one asked for kept."""
+        """Return the model's path through the windows; the last one is cached."""
         if self._path is None or self._path[0] is not model or self._path[1] is not self.windows:
             self._path = model, self.windows, self.shooting.path(model, self.windows)
         return self._path[2]
 
     def prediction(self, model: Model) -> Array:
-        """What a model predicts, (G, R) [rad]."""
+        """Return the positions that a model predicts, (G, R) [rad]."""
         return self.windows.by_segment(self.path(model).position)
 
     def linearise_starts(self, model: Model) -> None:
@@ -133,7 +133,7 @@ class Problem:
             self.windows = replace(self.windows, wound=wound)
 
     def _more_wound(self, model: Model, joints: list[int]) -> Array:
-        """By how much more (S, joints) integrals are wound up as each trial begins, which no log shows [N m]."""
+        """Estimate the missing wind-up (S, joints) of integrals at each trial's start, which no log shows [N m]."""
         prior = WOUND * self.shooting.per_joint("N m")[joints]
         moved = [
             self.windows.wound + prior[k] * STEP * np.eye(self.windows.wound.shape[1])[j] for k, j in enumerate(joints)
@@ -164,7 +164,7 @@ class Problem:
         self._inverse = np.asarray(np.linalg.inv(gram + np.eye(gram.shape[-1])), dtype=np.float64)
 
     def chosen_numbers(self, model: Model) -> NDArray[np.int64]:
-        """How many numbers (G,) of each segment's start were chosen by the segment itself: see `initial_states`."""
+        """Count the initial-state parameters (G,) fitted to each segment itself, see `linearise_starts`."""
         first = np.zeros((len(self.windows), self.windows.segments), dtype=np.int64)
         first[self.windows.time == 0.0, 0] = 2 * np.count_nonzero(self.shooting.gaps(model))
         first[np.unique(self.windows.trial, return_index=True)[1], 0] += len(self.shooting.integrating(model))
@@ -220,12 +220,12 @@ def _key(unknown: Unknown) -> tuple[str, str, int]:
 
 
 def _simulated(unknowns: Sequence[Unknown]) -> list[Unknown]:
-    """One unknown for each simulation: the offsets of one joint in all initialisations share one."""
+    """Return one unknown per simulation: the offsets of one joint in all initialisations share one."""
     return list({_key(unknown): unknown for unknown in unknowns}.values())
 
 
 def moved_model(model: Model, unknown: Unknown, part: float = STEP) -> tuple[Model, float]:
-    """The model with an unknown moved by a finite step within its bounds, and the step in units of its scale."""
+    """Move an unknown by a finite step within its bounds; return the model and the step in units of its scale."""
     step = part * unknown.scale
     if unknown.kind == "offset":
         moved = {key: value + step * (np.arange(len(value)) == unknown.place) for key, value in model.offsets.items()}
@@ -241,10 +241,10 @@ PLACES = 17  # within the gap: the time of landing depends on them
 
 
 def with_initial_states(shooting: Shooting, model: Model, windows: Windows) -> Windows:
-    """The windows with the initial state of each trial that follows its first segment best, one joint after the other.
+    """Return the windows with the initial state of each trial that fits its first segment best, joint by joint.
 
-    A link may stand anywhere within the gap, at rest or as fast as the motor. Without a gap it stands where its motor
-    says, whatever another model found.
+    A link may start anywhere within the gap, at rest or at the motor's speed. Without a gap it starts at the motor's
+    position, whatever initial state another model had.
     """
     gap = shooting.gaps(model)
     if not gap.any():
@@ -261,7 +261,7 @@ def with_initial_states(shooting: Shooting, model: Model, windows: Windows) -> W
 
 
 def _best(shooting: Shooting, model: Model, first: Windows, joint: int, gap: float) -> Array:
-    """The initial states (S, 2 n) with that of one joint chosen from all places in its gap."""
+    """Return the initial states (S, 2 n) with that of one joint chosen by least squares over its gap."""
     count, joints = len(first), first.position.shape[2]
     trials = []
     for still in (False, True):

@@ -23,9 +23,9 @@ ENOUGH = 12  # windows that show it, spread over the recording: up to 53 s of a 
 
 
 def step_shift(problem: Problem, fitted: Fit) -> Array:
-    """How far the unknowns (P,) would move were the simulation's steps `FINER` times as short.
+    """Return the shift of the unknowns (P,) if the simulation's steps were `FINER` times as short.
 
-    To first order: the least-squares answer of the unknowns to what finer steps change in the prediction.
+    To first order: the least-squares change of the unknowns due to the change of the prediction in finer steps.
     """
     part = spread(problem.windows)
     own, fine = Problem(problem.shooting, part), Problem(problem.shooting.finer(FINER), finer(part, FINER))
@@ -41,7 +41,7 @@ def step_shift(problem: Problem, fitted: Fit) -> Array:
 
 
 def spread(windows: Windows) -> Windows:
-    """As many windows as tell what a time step does, spread over the recording."""
+    """Return `ENOUGH` windows, spread over the recording, to measure the effect of the time step."""
     return windows.take(np.unique(np.linspace(0, len(windows) - 1, ENOUGH).round().astype(np.int64)))
 
 
@@ -75,18 +75,18 @@ def resolved(
     known: ModelFile | None = None,
     beside: float = 1.0,
 ) -> Recording:
-    """The recording with the longest steps whose error does not show.
+    """Return the recording with the longest simulation steps whose error is hidden by the noise.
 
-    Where the controller's rate is not stated these may be shorter than usual: rows far apart and a fine encoder show
-    what steps leave out that suffice elsewhere, torque limits that are reached between two rows above all. Where it is
-    stated they may be longer than its period, for a search takes as many times as long as a row has steps.
+    If the controller's rate is not stated, the steps may be shorter than usual: sparse rows and a fine encoder reveal
+    errors of steps that suffice elsewhere, above all where torque limits are reached between two rows. If it is
+    stated, the steps may be longer than its period, as the duration of a search is proportional to the steps per row.
 
     Args:
         recording: any.
-        effects: classes to compile in; their kernel is used again by a search for them.
-        say: takes a line where steps become shorter or longer.
-        known: the model to simulate; None: what the recording's owner states.
-        beside: error of the model that the steps' error hides behind [sensor noise].
+        effects: classes to compile in; a search for them reuses their kernel.
+        say: receives a line if the steps become shorter or longer.
+        known: the model to simulate; None: the values that the recording's owner states.
+        beside: error of the model, relative to which the steps' error is measured [sensor noise].
     """
     noise = noise_with_links(recording)
 

@@ -54,7 +54,7 @@ class Unknown:
         return float(model.terms[self.place].values[self.key])
 
     def put(self, model: Model, value: float) -> Model:
-        """The model with another value, kept within the bounds."""
+        """Return the model with another value of this unknown, clipped to the bounds."""
         value = min(max(value, self.low), self.high)
         if self.kind == "constant":
             return replace(model, constants=_changed(model.constants, self.key, self.place, value))
@@ -72,14 +72,14 @@ def _changed(arrays: Mapping[Key, Array], key: Key, place: int, value: float) ->
 
 
 def put_all(model: Model, unknowns: tuple[Unknown, ...], values: Array) -> Model:
-    """The model with all unknowns set."""
+    """Return the model with all unknowns set to these values."""
     for unknown, value in zip(unknowns, values, strict=True):
         model = unknown.put(model, float(value))
     return model
 
 
 def read_all(model: Model, unknowns: tuple[Unknown, ...]) -> Array:
-    """Values (P,) of the unknowns in a model."""
+    """Return the values (P,) of the unknowns in a model."""
     return np.array([unknown.of(model) for unknown in unknowns])
 
 
@@ -98,7 +98,7 @@ CREEP, CREEP_SPREAD, LARGEST_CREEP = 0.05, 0.1, 1.0  # [rad/s per N m] where fri
 
 
 def every_effect(effects: Sequence[type[Effect]], start: Model) -> tuple[type[Effect], ...]:
-    """The classes to compile: those to try, and those of the model to begin with."""
+    """Return the effect classes to compile: those to try, and those of the start model."""
     return tuple(dict.fromkeys([*effects, *(term.effect for term in start.terms)]))
 
 
@@ -137,7 +137,7 @@ def base_unknowns(
 
 
 def offset_unknowns(recording: Recording, sizes: Mapping[str, Scales]) -> tuple[Unknown, ...]:
-    """The joint offsets of each initialisation of a recording."""
+    """Return the joint offsets of each initialisation of a recording as unknowns."""
     initialisations = sorted({trial.initialisation for trial in recording.trials})
     return tuple(
         _offset(j, initialisation, sizes[joint].of("rad"))

@@ -51,17 +51,17 @@ class Candidate:
         return len(self.form) * len(self.joints)
 
     def parameters(self, joint: str) -> dict[str, Parameter]:
-        """All parameters of the effect with their sizes at a joint."""
+        """Return all parameters of the effect with their sizes at a joint."""
         return self.effect.parameters_at(self.sizes.get(joint, FINGER))
 
     def start(self, joint: str) -> dict[str, float]:
-        """The form's starts at a joint."""
+        """Return the start values of the form at a joint."""
         here, first = (self.sizes.get(one, FINGER) for one in (joint, self.joints[0]))
         units = {p.name: p.unit for p in self.effect.parameters}
         return {name: value * here.of(units[name]) / first.of(units[name]) for name, value in self.form.items()}
 
     def added_to(self, model: Model) -> tuple[Model, tuple[Unknown, ...]]:
-        """The model with the effect at its start, and the unknowns that this adds."""
+        """Return the model with the effect at its start, and the unknowns of the effect."""
         terms = [self._term(joint) for joint in self.joints]
         first = len(model.terms)
         unknowns = tuple(u for k, term in enumerate(terms) for u in term_unknowns(term, first + k, self.sizes))
@@ -75,7 +75,7 @@ class Candidate:
 
 
 def term_unknowns(term: Term, place: int, sizes: Sizes | None = None) -> tuple[Unknown, ...]:
-    """The unknowns of a term; where a parameter does not say otherwise, the size of its value is the scale."""
+    """Return the unknowns of a term; a parameter without a scale is scaled by the size of its value."""
     joint = (sizes or {}).get(term.joint, FINGER)
     parameters = term.effect.parameters_at(joint)
     known = {name: abs(term.values[name]) for name in term.fitted}
@@ -99,17 +99,17 @@ def term_unknowns(term: Term, place: int, sizes: Sizes | None = None) -> tuple[U
 
 
 def model_unknowns(model: Model, sizes: Sizes | None = None) -> tuple[Unknown, ...]:
-    """The unknowns of all effects that a model has."""
+    """Return the unknowns of all effects of a model."""
     return tuple(u for place, term in enumerate(model.terms) for u in term_unknowns(term, place, sizes))
 
 
 def forms(effect: EffectClass) -> list[dict[str, float]]:
-    """The forms of an effect at a finger's joint."""
+    """Return the forms of an effect at a finger's joint."""
     return effect.forms_at(FINGER)
 
 
 def candidates(sizes: Sizes, effects: Sequence[EffectClass]) -> list[Candidate]:
-    """Every effect in every form at every single joint where it can act; none that starts from the residual."""
+    """Return every effect in every form at each joint where it can act, except forms started from the residual."""
     return [
         Candidate(effect, (joint,), start, sizes)
         for effect in effects
@@ -121,9 +121,9 @@ def candidates(sizes: Sizes, effects: Sequence[EffectClass]) -> list[Candidate]:
 
 
 def with_details(candidate: Candidate, model: Model) -> tuple[Candidate, Model, tuple[Unknown, ...]] | None:
-    """The last effect of a fitted model with the details of its law free too: as candidate, model and unknowns.
+    """Free the details of the law of a fitted model's last effect; return candidate, model and unknowns.
 
-    None for a law that has no identifiable details beyond those fitted already.
+    Return None if the law has no identifiable details beyond those already fitted.
     """
     first = len(model.terms) - len(candidate.joints)
     scales = candidate.sizes.get(candidate.joints[0], FINGER)
@@ -140,13 +140,13 @@ def with_details(candidate: Candidate, model: Model) -> tuple[Candidate, Model, 
 
 
 def first_term(model: Model, effects: Sequence[Candidate], place: int) -> int:
-    """Which of a model's terms, the last of which are those of `effects`, is the first one of an effect."""
+    """Return the index of an effect's first term in a model whose last terms are those of `effects`."""
     known = len(model.terms) - sum(len(candidate.joints) for candidate in effects)
     return known + sum(len(candidate.joints) for candidate in effects[:place])
 
 
 def without_effect(model: Model, effects: Sequence[Candidate], place: int) -> Model:
-    """A fitted model, whose last terms are those of `effects`, without one of them."""
+    """Return a fitted model, whose last terms are those of `effects`, without one of these effects."""
     first = first_term(model, effects, place)
     return replace(model, terms=(*model.terms[:first], *model.terms[first + len(effects[place].joints) :]))
 
@@ -185,7 +185,7 @@ class Screen:
         self.gradient = np.einsum("grp,gr->p", base.columns, self.residual, optimize=True) - expected * np.array(offset)
 
     def columns(self, wanted: Sequence[Candidate]) -> Iterator[tuple[Candidate, Array]]:
-        """Each candidate with the change of the weighted prediction (G, R) that it makes at its start."""
+        """Yield each candidate with the change of the weighted prediction (G, R) at its start."""
         for first in range(0, len(wanted), BATCH):
             part = wanted[first : first + BATCH]
             models = [candidate.added_to(self.base.model)[0] for candidate in part]
@@ -222,9 +222,9 @@ AS_GOOD = 0.95  # share of the best first-order gain from which on a start of th
 
 
 def start(same: Sequence[Score]) -> Score:
-    """Of starts of one law, best first, the one that is nearest to its size among those that look as good as the best.
+    """Return, of a law's starts (best first) with about the best gain, the one nearest to the estimated size.
 
-    What has to become six times as large, as a small mass where a large one is meant, is extrapolated too far.
+    A start that must grow six times, such as a small mass in a search for a large one, is extrapolated too far.
     """
     return min(
         (score for score in same if score.gain >= AS_GOOD * same[0].gain),
@@ -233,9 +233,9 @@ def start(same: Sequence[Score]) -> Score:
 
 
 def resized(score: Score) -> Candidate:
-    """The candidate with its start as large as the first look says, where a single number makes the effect's size.
+    """Return the candidate with its start scaled to the screening's estimate, if one parameter sets the size.
 
-    Others may say where or how fast: they have no neutral value of zero.
+    Other parameters may set a position or a speed: their neutral value is not zero.
     """
     (name, start), *more = score.candidate.form.items()
     parameters = score.candidate.parameters(score.candidate.joints[0])

@@ -239,5 +239,5 @@ class HeldOut:
         return free_run_error(self.trials, runs).overall
 
     def worse(self, tried: Model, before: Model, alike: float = STANDARD.least_gain) -> bool:
-        """Whether a model does worse than what went before, by more than a part of the squared error."""
+        """Return whether a model is worse than the one before, by more than the share `alike` of the squared error."""
         return self.error(tried) ** 2 > (1.0 + alike) * self.error(before) ** 2

@@ -86,7 +86,9 @@ def sound(
     def in_detail(more: Explanation, less: Explanation) -> bool:
         return complete(less, base, criteria) and more.explained(less) < criteria.most
 
-    return [one for one in found if not any(refuted(one, other) for other in found)]
+    kept = [one for one in found if not any(refuted(one, other) for other in found)]
+    # along a chain of sets each may be refuted by another one
+    return kept or sorted(found, key=lambda one: one.judgement.costs.sum())[:1]
 
 
 def contains(richer: Explanation, simple: Explanation) -> bool:

@@ -59,9 +59,9 @@ class Missing:
 def missing_torques(
     problem: Problem, recording: Recording, model: Model, residual: Array, time: float | None = None
 ) -> list[Missing]:
-    """The torque that each joint would have to get so that a weighted residual (G, R) vanished: I r'' + D r' + K r.
+    """Return each joint's missing torque, with which a weighted residual (G, R) would vanish: I r'' + D r' + K r.
 
-    It is differentiated in windows of half width `time` [s], by default the usual one of the machine.
+    The residual is differentiated in windows of half width `time` [s], by default the usual one of the machine.
     """
     n, segment = len(recording.joints), problem.windows.segment
     weight, measured, left = (
@@ -101,7 +101,7 @@ def missing_torques(
 
 
 def _drive(problem: Problem, model: Model, position: Array, velocity: Array) -> Array:
-    """What the controller asks of the drives at positions and velocities (G, segment, n), as far as they can [N m]."""
+    """Return the controller's torque at positions and velocities (G, segment, n), clipped to the limits [N m]."""
     windows, constants = problem.windows, model.constants
     commands = windows.commands[:, windows.history * windows.substeps :: windows.substeps].reshape(position.shape)
     kp, kd, most = np.repeat(windows.gains, windows.segments, axis=0).swapaxes(0, 1)[:, :, None]
@@ -110,9 +110,9 @@ def _drive(problem: Problem, model: Model, position: Array, velocity: Array) -> 
 
 
 def shapes(missing: Missing) -> list[Shape]:
-    """The missing torque over every signal, most telling first.
+    """Return the missing torque over every signal, sorted by the explained share, largest first.
 
-    Where it looks different for motion up and down, as friction does, a signal has two curves.
+    A signal also has a curve for motion up and one for motion down if they differ, as with friction.
     """
     found = [_shape(missing, name) for name in missing.signals]
     found += [curve for one in found for curve in _by_direction(missing, one)]
@@ -136,7 +136,7 @@ def black_box(missing: Missing, seed: int = 0) -> float:
 
 
 def _features(missing: Missing, rng: np.random.Generator) -> Array:
-    """What the black box sees (samples, features)."""
+    """Return the inputs of the black box (samples, features)."""
     inputs = np.stack(list(missing.signals.values()), axis=1)
     signs = np.sign(np.stack([x for name, x in missing.signals.items() if name.startswith("velocity")], axis=1))
     inputs = (inputs - inputs.mean(axis=0)) / np.maximum(inputs.std(axis=0), 1e-12)
@@ -157,7 +157,7 @@ def _explained(
 
 
 def _by_direction(missing: Missing, both: Shape) -> list[Shape]:
-    """A curve for motion up and one for motion down, if they explain clearly more than one for both."""
+    """Return curves for motion up and motion down if they explain clearly more than one curve for both."""
     speed = missing.signals[f"velocity of {missing.joint} [rad/s]"]
     curves, left = [], 0.0
     for side, chosen in (("up", speed > 0.0), ("down", speed <= 0.0)):

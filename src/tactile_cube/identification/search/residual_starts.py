@@ -52,10 +52,10 @@ def periodic_candidates(
 def _starts(
     missing: Missing, form: Mapping[str, float], damping: float | None, size: float
 ) -> list[Mapping[str, float]]:
-    """The form at each strong harmonic, with the phase that the missing torque has there.
+    """Return the form at each strong harmonic, with the phase of the missing torque there.
 
-    A torque that repeats with the position is seen as it is; an error of the position sensor through its slope over
-    time, which the controller damps.
+    A torque that repeats with the position appears directly; an error of the position sensor appears as its time
+    derivative, multiplied by the damping of the controller.
     """
     if damping == 0.0:  # commanded torques: no controller takes the sensor's error for motion
         return []
@@ -107,7 +107,7 @@ SMOOTH = 1e-3  # weight of the squared third differences of the control torques,
 def profile_candidates(
     missing_torques: Sequence[Missing], sizes: Sizes, effects: Sequence[type[Effect]]
 ) -> list[Candidate]:
-    """A candidate at every joint for every effect with a profile, started at the mean torque that is missing there."""
+    """Return a candidate at every joint for every effect with a profile, started at the mean missing torque there."""
     return [
         Candidate(effect, (missing.joint,), start_of(effect, form, missing, sizes[missing.joint]), sizes)
         for effect in effects
