@@ -58,7 +58,7 @@ class MemoryLayout:
     size: int
 
     def view(self, memory: Array, key: str) -> Array:
-        """A writable view (..., shape) of a key in memory (..., size).
+        """Return a writable view (..., shape) of a key in memory (..., size).
 
         Raises:
             KeyError: no such key.
@@ -70,7 +70,7 @@ class MemoryLayout:
 
 
 def plan_memory(topology: Topology, effects: Sequence[type[Effect]], dt: float, trace_rows: int) -> MemoryLayout:
-    """The layout for a topology and the effects that may act on its joints."""
+    """Lay out the memory for a topology and the effects that may act on its joints."""
     C, N, n, joints = topology.chains, len(topology.parent), len(topology.leader), topology.joints
     keys: list[tuple[Shape, str]] = [
         ((1,), "dt step seen trace_rows trace_offset reading unsure follows"),
@@ -112,7 +112,7 @@ _ENTRY_POINTS = "entry_points"
 
 
 def load_kernel(topology: Topology, effects: Sequence[type[Effect]], layout: MemoryLayout) -> ModuleType:
-    """The compiled steps of a plant, see `steps.entry_points`, in a package of a folder in the cache and the steps'."""
+    """Load the compiled steps of a plant, see `steps.entry_points`, as a package of a cache folder and the steps'."""
     plant = kernel_source(topology, effects, layout)
     name = "kernel_" + _fingerprint(plant, effects)
     if name not in sys.modules:
@@ -127,7 +127,7 @@ def load_kernel(topology: Topology, effects: Sequence[type[Effect]], layout: Mem
 
 
 def cache_directory() -> Path:
-    """Where compiled kernels are kept: $XDG_CACHE_HOME/tactile_cube, ~/.cache, or the temporary directory."""
+    """Return the directory of compiled kernels: $XDG_CACHE_HOME/tactile_cube, ~/.cache, or the temporary directory."""
     home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     for root in (Path(home), Path(tempfile.gettempdir()) / f"cache-{os.getuid()}"):
         folder = root / "tactile_cube"
@@ -141,7 +141,7 @@ def cache_directory() -> Path:
 
 
 def _fingerprint(source: str, effects: Sequence[type[Effect]]) -> str:
-    """Of everything that the machine code depends on: any change of a law or a library asks for a new file."""
+    """Hash everything that the machine code depends on: any change of a law or a library requires a new file."""
     digest = hashlib.sha256(source.encode())
     for step in sorted(_STEPS.glob("*.py")):
         digest.update(step.read_bytes())

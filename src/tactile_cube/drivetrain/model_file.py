@@ -176,12 +176,12 @@ class ModelFile(Strict):
 
 
 def read_model(path: str | Path) -> ModelFile:
-    """The model in a YAML file. Raises InputError: naming the file, the key and the value received."""
+    """Read the model in a YAML file. Raises InputError: naming the file, the key and the value received."""
     return read_schema(Path(path), ModelFile)
 
 
 def as_model(given: ModelFile | Mapping[str, Any] | str | Path) -> ModelFile:
-    """A model, from its contents or from the path of its file.
+    """Return a model, from its contents or from the path of its file.
 
     Raises:
         InputError: naming the key and the value received.

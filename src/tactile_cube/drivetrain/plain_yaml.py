@@ -54,7 +54,7 @@ def _at(node: yaml.Node, problem: str) -> yaml.MarkedYAMLError:
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
-    """The mapping in `path`.
+    """Read the mapping in `path`.
 
     Raises:
         InputError: the file is missing or too large, is no YAML, asks for an object (`!!python/...`), has a key twice
@@ -88,7 +88,7 @@ def _require_shallow(text: str) -> None:
 
 
 def _size(value: Any, known: dict[int, int]) -> int:
-    """Values within a value, those that aliases repeat each time; a value within itself counts as `limits.VALUES`."""
+    """Count the values within a value, aliases each time; a value within itself counts as `limits.VALUES`."""
     if not isinstance(value, dict | list):
         return 1
     if id(value) not in known:
@@ -108,7 +108,7 @@ def read_schema(path: Path, schema: type[Schema]) -> Schema:
 
 
 def describe(error: ValidationError) -> str:
-    """The first problem of a validation error in one line, and how many more there are."""
+    """Describe the first problem of a validation error in one line, with the number of further problems."""
     first, more = error.errors()[0], error.error_count() - 1
     key = ".".join(str(part) for part in first["loc"])
     value, message = repr(first["input"]), str(first["msg"]).removeprefix("Value error, ")

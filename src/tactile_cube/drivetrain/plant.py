@@ -92,7 +92,7 @@ def damping_number(tree: RigidBodyTree, constants: DrivetrainConstants, dt: floa
 def check_damping_stability(
     tree: RigidBodyTree, constants: DrivetrainConstants, dt: float, poses: Iterable[npt.ArrayLike] | None = None
 ) -> float:
-    """The largest damping number over poses (n,); by default zero and the corners of the joints' range.
+    """Return the largest damping number over poses (n,); by default zero and the corners of the joints' range.
 
     Raises:
         InputError: it reaches 2: the simulation would diverge.
@@ -185,18 +185,18 @@ class Plant:
         return load_kernel(self.topology, self.effects, self.layout)
 
     def view(self, memory: Array, key: str) -> Array:
-        """A writable view (..., shape) of memory (..., size)."""
+        """Return a writable view (..., shape) of memory (..., size)."""
         return self.layout.view(memory, key)
 
     def signal(self, memory: Array, row: int) -> Array:
-        """One signal (..., all joints) of the last step, e.g. `signals.MOTOR_POSITION`."""
+        """Return one signal (..., all joints) of the last step, e.g. `signals.MOTOR_POSITION`."""
         rows = self.view(memory, "signals")[..., row, :]
         return rows.reshape(*memory.shape[:-1], self.topology.joints)
 
     def memory(
         self, constants: DrivetrainConstants, gravity: npt.ArrayLike = (0.0, 0.0, -9.81), effects: Sequence[Effect] = ()
     ) -> Array:
-        """A memory (size,) at rest at zero, with these constants, and effects whose classes are among the plant's.
+        """Build a memory (size,) at rest at zero, with these constants, and with effects of the plant's classes.
 
         Per-joint constants hold n (repeated in every chain) or C n numbers; gravity (3,) or (C, 3) [m/s^2] is in the
         frame of each chain's base.
@@ -256,7 +256,7 @@ class Plant:
             self.view(memory, "needs_weight")[...] = 1.0
 
     def place(self, joint: str) -> Place:
-        """Where a joint sits in the plant."""
+        """Return the place of a joint in the plant."""
         a = self._index(joint)
         chain, j = divmod(a, len(self.topology.leader))
         link = self.topology.leader[j]

@@ -23,7 +23,7 @@ UNBOUNDED = 1.0  # [rad] half range of a joint without limits
 
 
 def safe_range(joint: RigJoint, share: float) -> tuple[float, float]:
-    """The middle `share` of a joint's range [rad]."""
+    """Return the middle `share` of a joint's range [rad]."""
     lower, upper = (joint.lower, joint.upper) if np.isfinite(joint.upper - joint.lower) else (-UNBOUNDED, UNBOUNDED)
     centre, half = 0.5 * (lower + upper), 0.5 * share * (upper - lower)
     return centre - half, centre + half
@@ -70,7 +70,7 @@ def _held(time: Array, rest: tuple[float, float], move: float, rng: np.random.Ge
 
 
 def multisine(time: Array, rng: np.random.Generator) -> Array:
-    """A sum of sines from 0.2 to 6 Hz with falling amplitude, in 0..1: inertia, delay, lag."""
+    """Return a sum of sines from 0.2 to 6 Hz with falling amplitude, in 0..1; it excites inertia, delay and lag."""
     frequencies = np.geomspace(0.2, 6.0, 8) * rng.uniform(0.9, 1.1, 8)
     waves = np.sin(2 * np.pi * np.outer(time, frequencies) + rng.uniform(0, 2 * np.pi, 8)) @ (1 / frequencies**0.7)
     return np.asarray(0.5 + 0.5 * waves / np.max(np.abs(waves)))
@@ -134,10 +134,10 @@ def _torque(trial: Trial) -> Array:
 
 
 def without_touches(recording: Recording) -> Recording:
-    """The recording without links that touch or hold something, which no model of a free mechanism can follow.
+    """Drop the trials with a touch or a held object, which no model of a free mechanism can follow.
 
     Raises:
-        InputError: nothing is left.
+        InputError: no trial is left.
     """
     if not has_free_motion(recording):
         raise InputError(
@@ -148,7 +148,7 @@ def without_touches(recording: Recording) -> Recording:
 
 
 def has_free_motion(recording: Recording) -> bool:
-    """Whether some trial shows the mechanism alone."""
+    """Return whether some trial shows the mechanism alone, without a touched or held object."""
     return any(map(_is_free, recording.trials))
 
 
@@ -157,7 +157,7 @@ def _is_free(trial: Trial) -> bool:
 
 
 def with_object(recording: Recording) -> Recording:
-    """The trials in which the hand holds an object."""
+    """Return the recording with only the trials in which the hand holds an object."""
     return recording.with_trials([trial for trial in recording.trials if trial.load is not None])
 
 
@@ -180,7 +180,7 @@ def _time(rig: Recording, duration: float) -> Array:
 
 
 def _known_force(rig: Recording, number: int, rng: np.random.Generator) -> list[BenchTrial]:
-    """One configuration, approached from both sides under several weights that pull one way; one trial a weight."""
+    """Build the trials of one configuration, approached from both sides, each with another weight in one direction."""
     configuration, direction = _configuration(rig, rng), rng.normal(size=3)
     direction /= np.linalg.norm(direction)
     tree = rig.rigid_body()  # the force acts as far beyond the last link's centre of mass as the joint is before it

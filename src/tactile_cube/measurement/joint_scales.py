@@ -19,7 +19,7 @@ SMALL = 1e-9  # part of another size that stands for nothing at all
 
 
 def joint_scales(recording: Recording) -> tuple[Scales, ...]:
-    """The scales of each joint of a recording."""
+    """Compute the scales of each joint of a recording."""
     tree = recording.rigid_body()
     positions = np.concatenate([trial.position for trial in recording.trials])
     low, high = np.quantile(positions, [OUTSIDE, 1.0 - OUTSIDE], axis=0)
@@ -57,11 +57,11 @@ def joint_scales(recording: Recording) -> tuple[Scales, ...]:
 
 
 def unit_of_time(recording: Recording, inertia: Array, spans: Array) -> float:
-    """What a second of a finger stands for [s], a whole decade.
+    """Return the time that corresponds to one second of a finger [s], rounded to a power of ten.
 
-    It goes by the time in which the fastest joint would cross its range, pushed by its usual torque or as fast as it
-    mostly moves. CROSSING is the centre (in its logarithm) of what blind rigs of a finger's size have, 0.06 to 0.2 s,
-    so that all of them, and a finger whose drive is several times weaker or stronger, lie within one decade.
+    It is derived from the time in which the fastest joint would cross its range, driven by its usual torque or as
+    fast as it mostly moves. CROSSING is the logarithmic centre of the values of blind rigs of a finger's size, 0.06 to
+    0.2 s, so that all of them, and a finger whose drive is several times weaker or stronger, lie within one decade.
     """
     moved = np.concatenate([np.abs(np.diff(trial.position[::COARSE], axis=0)) for trial in recording.trials])
     coasting = spans / np.maximum(FASTER * moved.mean(axis=0) / (COARSE * recording.step), SMALL * spans)

@@ -9,13 +9,13 @@ from tactile_cube.measurement.recordings.recording import Recording
 
 
 def held_out_split(recording: Recording, share: float = 0.33, seed: int = 0) -> tuple[Recording, Recording]:
-    """The trials to fit, and a `share` of all trials to judge by, chosen by `seed`.
+    """Split a recording into trials to fit and a held-out `share` of all trials, chosen by `seed`.
 
-    Whole robot initialisations are held out where there are several, so that no joint offset is on both sides;
-    otherwise whole trials: of each kind that was repeated all but one at most, or, if none was, of all kinds together.
+    Whole robot initialisations are held out if there are several, so that no joint offset is on both sides; otherwise
+    whole trials: all but one at most of each repeated kind, or, if no kind is repeated, of all kinds together.
 
     Raises:
-        InputError: there is one trial alone.
+        InputError: there is only one trial.
     """
     if len(recording.trials) < 2:
         raise InputError(
@@ -47,10 +47,10 @@ FEWEST_FITTED = 5  # trials that stay to be fitted; with fewer a test part would
 
 
 def with_test_part(fitted: Recording, trials: int, seed: int = 0) -> tuple[Recording, Recording | None]:
-    """The trials to fit without some that only test: nothing is fitted to them and nothing chosen by them.
+    """Split test trials off the trials to fit: nothing is fitted to them and nothing is chosen by them.
 
-    They come from the trials to fit, for those that choose are few already; of each kind at least one stays there.
-    None where there are too few. `trials` is how many the recording has in all, `seed` chooses.
+    They come from the trials to fit, as the held-out ones are few already; of each kind at least one stays there.
+    The test part is None if there are too few trials. `trials` is the recording's number of trials, `seed` chooses.
     """
     kinds = Counter(trial.kind for trial in fitted.trials)
     repeated = max(kinds.values()) > 1

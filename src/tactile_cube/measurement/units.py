@@ -13,13 +13,13 @@ SLIDING = (("N m", "N"), ("kg m^2", "kg"), ("rad", "m"))
 
 
 def common_unit(units: Iterable[str]) -> str:
-    """The unit of a number over several joints: deg or m where all have it, else rad; `rad or m` where some slide."""
+    """Return the unit of a value over several joints: deg or m if all have it, else rad; `rad or m` if some slide."""
     found = set(units) or {TURNS}
     return found.pop() if len(found) == 1 else EITHER if SLIDES in found or EITHER in found else TURNS
 
 
 def milli(value: float, unit: str = TURNS, digits: int = 3) -> str:
-    """A position [rad or m] in thousandths, or degrees, three digits: 0.0471 mrad, 12.3 mm, 0.624 deg."""
+    """Format a position [rad or m] in thousandths, or degrees, three digits: 0.0471 mrad, 12.3 mm, 0.624 deg."""
     name, size = SMALL[unit]
     return f"{short(size * value, digits)} {name}"
 
@@ -31,7 +31,7 @@ def short(value: float, digits: int = 3) -> str:
 
 
 def of_joint(text: str, unit: str) -> str:
-    """A unit, or a label with a unit in it, as a joint of `unit` has it: `N m s/rad` is `N s/m` where it slides."""
+    """Convert a unit, or a label with one, for a joint of `unit`: `N m s/rad` becomes `N s/m` if the joint slides."""
     if unit != SLIDES:
         return text
     for turning, sliding in SLIDING:
@@ -40,7 +40,7 @@ def of_joint(text: str, unit: str) -> str:
 
 
 def shown(label: str, unit: str) -> tuple[str, float]:
-    """A signal's label as a joint of `unit` has it, and what its SI values are to be multiplied by.
+    """Return a signal's label for a joint of `unit`, and the factor by which its SI values are multiplied.
 
     Example:
         >>> shown("velocity of elbow [rad/s]", "deg")

@@ -152,7 +152,7 @@ def compare_recording(
 
 
 def bounded(simulated: Sequence[Simulated]) -> list[Simulated]:
-    """The same, where a simulation that diverges has finite numbers."""
+    """Clip simulated values to +-FAR and set nan to FAR, so that a diverging simulation stays finite."""
 
     def finite(values: Array) -> Array:
         return np.nan_to_num(np.clip(values, -FAR, FAR), nan=FAR)
@@ -168,7 +168,7 @@ def describe_comparison(
     band: Band | None,
     step: float,
 ) -> Comparison:
-    """What simulations of the trials, one each, leave of the measurement, and where."""
+    """Compare each trial with its simulation: the residuals, and where they are large."""
     trials, joints, positions = recording.trials, recording.joints, [one.position for one in simulated]
     errors, raw = error.residuals(trials, positions), error.raw_residuals(trials, positions)
     summary = summarise_errors(errors, joints)
@@ -201,7 +201,7 @@ def describe_comparison(
 
 
 def comparison_json(comparison: Comparison) -> dict[str, Any]:
-    """The content of comparison.json: plain numbers, errors in rad, times in s."""
+    """Return the content of comparison.json: plain numbers, errors [rad], times [s]."""
     recording, floor, band = comparison.recording, comparison.floor, comparison.band
     return {
         "recording": str(recording.folder),

@@ -43,10 +43,10 @@ def raw_residuals(trials: Sequence[Trial], simulated: Sequence[Array]) -> list[A
 
 
 def normalised_fit(trials: Sequence[Trial], errors: Sequence[Array], joints: Sequence[str]) -> dict[str, float]:
-    """How much of each joint's motion a simulation follows [%]: 100 (1 - |error| / |position - mean|), as NRMSE fit.
+    """Compute the NRMSE fit of each joint's motion [%]: 100 (1 - |error| / |position - mean|).
 
-    100 is a perfect model, 0 one that predicts the mean, negative a worse one. The mean is each trial's own.
-    0 too where a joint never moves.
+    A perfect model has 100, one that predicts the mean 0, a worse one a negative fit. The mean is each trial's own.
+    The fit of a joint that never moves is also 0.
     Source: Ljung, System Identification, 1999; `compare` of MATLAB's System Identification Toolbox.
     """
     squares = np.nansum([np.nansum(error**2, axis=0) for error in errors], axis=0)
@@ -107,9 +107,9 @@ CORRELATED = 50.0  # samples that the error of a wrong model counts as one
 
 
 def with_fitted_offsets(simulator: Simulator, model: Model) -> Model:
-    """The model with the joint offsets of each initialisation by which it follows its trials best, from none at all.
+    """Return the model with joint offsets fitted to the trials of each initialisation, starting from zero.
 
-    An offset does more than shift the reading: gravity and all that depends on the angle act elsewhere.
+    An offset not only shifts the reading: gravity and all else that depends on the angle change too.
     """
     model = replace(model, offsets={key: np.zeros_like(value) for key, value in model.offsets.items()})
     units = DIFFERENCE * np.eye(len(simulator.recording.joints))
@@ -127,7 +127,7 @@ def with_fitted_offsets(simulator: Simulator, model: Model) -> Model:
 
 
 def _step(offset: Array, error: Array, slopes: Array) -> Array:
-    """A cautious Gauss-Newton step of one initialisation's offset (joints,) [rad]."""
+    """Return one initialisation's offset (joints,) [rad] after a regularised, clipped Gauss-Newton step."""
     trust = CORRELATED * float(np.mean(error**2)) / SPREAD**2
     normal = slopes.T @ slopes + trust * np.eye(len(offset))
     step = np.linalg.solve(normal, slopes.T @ error - trust * offset)
@@ -135,7 +135,7 @@ def _step(offset: Array, error: Array, slopes: Array) -> Array:
 
 
 def _errors(simulator: Simulator, models: Sequence[Model]) -> list[dict[int, Array]]:
-    """Of each model: initialisation -> residuals of its trials end to end [rad], 0 where a sample was bridged."""
+    """Return, for each model, initialisation -> concatenated residuals of its trials [rad], 0 at bridged samples."""
     trials, found = simulator.recording.trials, []
     for runs in simulator.free_runs(models):
         errors = residuals(trials, [run.position for run in runs])

@@ -13,7 +13,7 @@ from tactile_cube.measurement.units import milli
 
 LONGEST_LAG = 0.3  # [s] two starts of one command are not further apart
 SAME = 0.02  # share of a command's spread by which a repeat may differ
-LEFT_START = 0.1  # [rad] of motion after which a joint no longer knows where friction held it at the start
+LEFT_START = 0.1  # [rad] of motion after which it no longer matters where friction held a joint at the start
 SHORTEST = 0.8  # share of the shorter trial that must overlap
 
 
@@ -93,12 +93,12 @@ def _telling(trial: Trial) -> NDArray[np.bool_]:
 
 
 def _standard(values: Array) -> Array:
-    """Values (R, ...) with mean 0 and standard deviation 1 over the repeats."""
+    """Standardise values (R, ...) to mean 0 and standard deviation 1 over the repeats."""
     centred = values - values.mean(axis=0)
     return np.asarray(centred / np.maximum(centred.std(axis=0), np.finfo(float).tiny))
 
 
-CHANCE, ORDERS = 0.01, 5000  # probability of that drift by chance, and random orders of the repeats that tell it
+CHANCE, ORDERS = 0.01, 5000  # probability of that drift by chance, and random orders of the repeats that estimate it
 FEWEST_REPEATS = 3
 
 
@@ -253,7 +253,7 @@ def reading_step(signal: Array) -> float:
 
 
 def noise_with_links(recording: Recording) -> Array:
-    """The same, and after it that of the sensors on links, nan where there are none (2 n,) [rad]."""
+    """Return the sensor noise (2 n,) [rad]: of joints, see `sensor_noise`, then of link sensors, nan without one."""
     noise = np.concatenate([sensor_noise(recording), np.full(len(recording.joints), np.nan)])
     for j in recording.linked:
         shown = [t.link_position[t.valid, j] for t in recording.trials if t.link_position is not None and j in t.linked]

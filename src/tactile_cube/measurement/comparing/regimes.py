@@ -33,7 +33,7 @@ class Regime:
 
 
 def regimes(trials: Sequence[Trial], errors: Sequence[Array], joints: Sequence[str]) -> list[Regime]:
-    """The table of regimes, joint by joint, from residuals (n, joints) of each trial."""
+    """Build the table of regimes, joint by joint, from the residuals (n, joints) of each trial."""
     table: list[Regime] = []
     velocities = [trial.velocity() for trial in trials]
     for index, joint in enumerate(joints):
@@ -95,7 +95,7 @@ def _parts(trials: Sequence[Trial], velocities: Sequence[Array], joint: int) -> 
 
 
 def _load(trials: Sequence[Trial], joint: int) -> dict[str, Mask]:
-    """By the size of the measured torque, as far as there is one."""
+    """Split the samples by the size of the measured torque; return no regimes without a measured torque."""
     parts = [np.full(len(t.time), np.nan) if t.torque is None else t.torque[:, joint] for t in trials]
     torque = np.abs(np.concatenate(parts))
     if np.isnan(torque).all():
@@ -122,7 +122,7 @@ PREPOSITIONS = {"speed": "at", "load": "at", "posture": "in the", "time": "in th
 def where_it_fails(
     table: Sequence[Regime], errors: Mapping[str, float], floor: NoiseFloor, units: Mapping[str, str]
 ) -> list[str]:
-    """One sentence for each joint, the worst joint first."""
+    """Describe each joint's error in one sentence; the joint with the largest error over noise floor comes first."""
     worst_first = sorted(errors, key=lambda joint: -errors[joint] / floor.joints[joint])
     return [
         _sentence(joint, [r for r in table if r.joint == joint], errors[joint], floor, units[joint])
@@ -193,7 +193,7 @@ class CrossCorrelation:
 
 
 def whiteness(trials: Sequence[Trial], errors: Sequence[Array], joints: Sequence[str]) -> list[Whiteness]:
-    """The test of each joint's residual over `LAGS` lags."""
+    """Test the whiteness of each joint's residual over `LAGS` lags."""
     results = []
     for index, joint in enumerate(joints):
         columns = [_filled(error[:, index]) for error in errors]
@@ -214,7 +214,7 @@ def ljung_box(values: Array) -> float:
 def cross_correlations(
     trials: Sequence[Trial], errors: Sequence[Array], joints: Sequence[str]
 ) -> list[CrossCorrelation]:
-    """Every joint's residual against velocity, acceleration, torque, ... of all joints, the strongest first."""
+    """Correlate every joint's residual with velocity, acceleration, torque, ... of all joints, the strongest first."""
     found: dict[tuple[str, str], list[tuple[float, float, float]]] = {}
     for trial, error in zip(trials, errors, strict=True):
         causes = {name: (cause, _autocorrelation(cause)) for name, cause in _causes(trial, joints).items()}

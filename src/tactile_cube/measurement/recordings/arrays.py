@@ -60,7 +60,7 @@ def recording_from_arrays(
     folder: str | Path | None = None,
     mode: Literal["position", "torque"] = "position",
 ) -> Recording:
-    """A recording as `compare`, `diagnose` and `identify` take it, checked as if it had been read from disk.
+    """Build a recording for `compare`, `diagnose` and `identify`, checked as if it had been read from disk.
 
     Args:
         trials: what was measured.
@@ -70,7 +70,7 @@ def recording_from_arrays(
         kp: stiffness of the impedance controller [N m/rad], one number or one for each joint; not used in torque mode.
         kd: its damping [N m s/rad].
         torque_limit: its limit [N m].
-        nominal: what you believe of the drive: stiffness [N m/rad], static_friction [N m], reflected_inertia [kg m^2].
+        nominal: assumed values of the drive: stiffness [N m/rad], static_friction [N m], reflected_inertia [kg m^2].
         gravity: in the base frame (3,) [m/s^2].
         read: whether a row's position was read before its command was sent, as most loops log, or after it acted.
         resolution: of the position [rad].

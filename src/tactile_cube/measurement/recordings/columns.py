@@ -41,10 +41,10 @@ class TrialColumns:
 
 
 def pick_columns(table: Table, joints: tuple[str, ...], path: Path) -> tuple[TrialColumns, list[str]]:
-    """The named columns of a table, and warnings about what was left aside.
+    """Return the named columns of a table, and warnings about what is not used.
 
     Raises:
-        InputError: a missing column, a trial too short to say anything, or a value that is no finite number.
+        InputError: a missing column, a trial with too few samples, or a value that is not a finite number.
     """
     others = {name.rpartition(".")[0] for name in table if name.rpartition(".")[2] in SIGNALS} - set(joints) - {""}
     unknown = "columns of '{}' are ignored: it is not among joints {}"
@@ -117,7 +117,7 @@ def without_outliers(
 
 
 def _outliers(values: Array) -> tuple[NDArray[np.int64], Array]:
-    """Rows of outliers, and the values with outliers replaced by the cubic through their neighbours."""
+    """Return the rows of outliers, and the values with outliers replaced by the cubic through their neighbours."""
     differences = np.abs(values - _beside(values)[1])
     bounds = (times * float(np.quantile(differences, quantile)) for quantile, times in BEYOND.items())
     limit = next((bound for bound in bounds if bound > 0.0), 0.0)
@@ -151,7 +151,7 @@ def _beside(values: Array) -> tuple[Array, Array]:
 
 UNITS = {1e3: "milliseconds", 1e6: "microseconds", 1e9: "nanoseconds"}
 DROPPED = 1.75  # periods between samples above which at least one is missing
-LONGEST_GAP = 0.25  # [s] beyond this the command in between is anybody's guess
+LONGEST_GAP = 0.25  # [s] beyond this the command in between is unknown
 JITTER = 0.1  # share of a period that is worth a warning
 TINY = 1e-12  # share of a period below which no rate fits
 ON_GRID = 0.02  # share of a period below which samples are taken as they are

@@ -63,7 +63,7 @@ def check_coupling(description: Description, rig: Rig) -> list[str]:
 
 
 def gains_of(description: Description, entry: TrialEntry | None, key: str) -> Gains:
-    """The gains of a trial, or the recording's own without `entry`; `key` is what an error names.
+    """Return the gains of a trial, or without `entry` those of the recording; error messages name `key`.
 
     Raises:
         ValueError: gains with which no command could move a joint.
@@ -119,7 +119,7 @@ NEGLIGIBLE = 0.01  # [N m] of missing torque that friction explains
 
 
 def swap_warning(recording: Recording) -> list[str]:
-    """A warning if the torques fit the weight of the links far better with two joints swapped."""
+    """Return a warning if the torques fit the weight of the links far better with two joints swapped."""
     trials = [trial for trial in recording.trials if trial.torque is not None and not trial.is_bench]
     if recording.torque_controlled or len(recording.joints) < 2 or not trials:
         return []

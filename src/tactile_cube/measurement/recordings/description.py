@@ -156,10 +156,10 @@ class Description(Strict):
 
 
 def per_joint(value: PerJoint, joints: tuple[str, ...], key: str) -> NDArray[np.float64]:
-    """One number per joint, shape (joints,), from a number, a list in joint order or a mapping.
+    """Convert a number, a list in joint order or a mapping to one value per joint, shape (joints,).
 
     Raises:
-        ValueError: a list of another length, a mapping that lacks a joint or names another one, a number that is none.
+        ValueError: a list of another length, a mapping that lacks a joint or names another one, nan, too large a value.
     """
     if isinstance(value, dict):
         if set(value) != set(joints):

@@ -140,9 +140,9 @@ def check_assignment(columns: TrialColumns, joints: list[RigJoint], path: Path) 
 
 
 def _mirrored(command: Array, position: Array) -> bool:
-    """Whether a joint moves as far as its command and against it, in slow motion as in fast.
+    """Return whether a joint moves as far as its command but in the opposite direction, in slow and in fast motion.
 
-    Beyond its resonance it moves against its command too, but the less the faster.
+    Beyond its resonance a joint also moves against its command, but its amplitude falls with the frequency.
     """
     asked, moved = (np.fft.rfft(one - one.mean())[1:] for one in (command, position))
     power = np.cumsum(np.abs(asked) ** 2)

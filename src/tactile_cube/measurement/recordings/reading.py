@@ -32,7 +32,7 @@ DESCRIPTION = "recording.yaml"
 
 
 def read_recording(folder: str | Path) -> Recording:
-    """The recording in a folder, checked and on a uniform time grid.
+    """Read the recording in a folder, checked and on a uniform time grid.
 
     Raises:
         InputError: naming file, column, row and value of what cannot be used.
@@ -119,7 +119,7 @@ def _trial(path: Path, most: int, entry: TrialEntry, description: Description, r
 
 
 def without_excluded(trial: Trial, intervals: Sequence[tuple[float, float]], key: str) -> list[Trial]:
-    """What lies before, between and after the intervals, as trials that start at 0; shorter rests are dropped.
+    """Cut the intervals out of a trial; return the parts as trials that start at 0, without those that are too short.
 
     Raises:
         InputError: an interval that ends before it starts.

@@ -76,7 +76,7 @@ class Recording:
         return max(1, math.ceil(self.step / longest - 1e-6), round(control / self.rate))
 
     def with_controller_rate(self, rate: float) -> Recording:
-        """The same for a controller that computes its torque so often [Hz]."""
+        """Return the recording with a controller that computes its torque at `rate` [Hz]."""
         controller = self.description.controller.model_copy(update={"rate_hz": rate})
         return replace(self, description=self.description.model_copy(update={"controller": controller}))
 
@@ -102,14 +102,14 @@ class Recording:
         return {joint: said.get(joint, unit) if unit == TURNS else unit for joint, unit in self.units.items()}
 
     def stated(self, constant: str, joint: str) -> float | None:
-        """What the owner states of a constant of one joint, or None."""
+        """Return the owner's value of a constant of one joint, or None if the owner states none."""
         values: Array | None = getattr(self.gains, constant, self.nominal.get(constant))
         if values is None or constant in self.description.unknown:
             return None
         return float(values[self.joints.index(joint)])
 
     def rigid_body(self) -> rigid_body.RigidBodyTree:
-        """The mechanism. Raises InputError: the URDF and the joints of recording.yaml make none."""
+        """Build the mechanism. Raises InputError: the URDF and the joints of recording.yaml define no mechanism."""
         coupled = {name: rigid_body.Mimic(c.joint, c.ratio, c.offset) for name, c in self.coupled.items()}
         try:
             return rigid_body.RigidBodyTree.from_urdf(self.urdf, self.joints, coupled)
@@ -117,5 +117,5 @@ class Recording:
             raise InputError(f"{self.rig.path}: {error}") from None
 
     def with_trials(self, trials: list[Trial] | tuple[Trial, ...]) -> Recording:
-        """The same rig with these trials alone."""
+        """Return the recording with only these trials."""
         return replace(self, trials=tuple(trials))

@@ -37,12 +37,12 @@ class RigJoint:
         return max(self.lower, -most), min(self.upper, most)
 
     def beyond(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How far values [rad or m] lie outside the bounds; negative inside."""
+        """Return how far values [rad or m] lie outside the bounds; negative inside."""
         lower, upper = self.bounds
         return np.maximum(values - upper, lower - values)
 
     def reaches(self, values: NDArray[np.float64]) -> bool:
-        """Whether values can be positions of this joint, or are far outside its bounds."""
+        """Return whether values can be positions of this joint, and are not far outside its bounds."""
         lower, upper = self.bounds
         slack = 0.0 if self.prismatic else WRONG_ZERO
         return bool(np.max(self.beyond(values)) <= 0.5 * (upper - lower) + slack)
@@ -72,7 +72,7 @@ class Rig:
         return {key: row for key, row in self.stated.items() if key not in CONTROLLER}
 
     def understood(self, joints: Sequence[str]) -> Iterator[tuple[str, str, str]]:
-        """What the file states of drives, for people: what, how, and the source."""
+        """Yield what the file states of drives, for display: the quantity, its values, and the source."""
         for key, row in self.stated.items():
             values = [f"{row[joint]:.4g}" for joint in joints if joint in row]
             yield f"{key}", ", ".join(values), f"{self.stated_by or self.path.name}, where you state none"
@@ -81,10 +81,10 @@ class Rig:
 
 
 def read_rig(path: Path) -> Rig:
-    """The mechanism in a URDF, or in an MJCF, which MuJoCo reads.
+    """Read the mechanism in a URDF, or in an MJCF, which MuJoCo reads.
 
     Raises:
-        InputError: the file is missing or too large, neither, or has no movable joint.
+        InputError: the file is missing or too large, is no URDF or MJCF, or has no movable joint.
     """
     text = read_text(path)
     if not is_mjcf(text):
@@ -94,7 +94,7 @@ def read_rig(path: Path) -> Rig:
 
 
 def parse_rig(text: str, path: Path) -> Rig:
-    """The rig in a URDF's text; `path` is what errors name.
+    """Parse the rig in a URDF's text; error messages name `path`.
 
     Raises:
         InputError: no URDF, or no robot with a movable joint.

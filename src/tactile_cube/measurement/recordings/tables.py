@@ -39,10 +39,10 @@ class Dialect:
 
 
 def dialect_of(path: Path) -> Dialect:
-    """How the CSV file at `path` is written.
+    """Detect the dialect of the CSV file at `path`.
 
     Raises:
-        InputError: it is compressed, has lines without end, no names of columns, or blanks between its columns.
+        InputError: it is compressed, has too long a line, no column names, or blanks between its columns.
     """
     with path.open("rb") as stream:
         start = [stream.readline(limits.LINE) for _ in range(LOOKED_AT)]
@@ -86,7 +86,7 @@ def _fields(line: str, separator: str) -> list[str]:
 
 
 def _header(rows: Sequence[list[str]]) -> tuple[int, int] | None:
-    """The first row of words alone, and that of the numbers, as many, below it; units may stand in between."""
+    """Find the first row of words alone and the row of as many numbers below it; a row of units may lie between."""
     for k, names in enumerate(rows[:-1]):
         if len(names) < 2 or not any(names) or any(VALUE.fullmatch(name) for name in names):
             continue
@@ -99,7 +99,7 @@ def _header(rows: Sequence[list[str]]) -> tuple[int, int] | None:
 
 
 def _without_header(path: Path, text: list[str], lines: list[int], encoding: str) -> Dialect:
-    """The first line is the header, or else the names stand in a comment above it."""
+    """Take the first line as header, or the comment above it if that line has numbers."""
     first = text[lines[0]] if lines else ""
     separator = max(",;\t", key=first.count)
     if separator not in first and len(first.split()) > 1:
@@ -131,7 +131,7 @@ ADVICE = {
 
 
 def unknown_ending(path: Path, known: str) -> InputError:
-    """The error for a file that is not read, with what to do."""
+    """Return the error for a file with an unknown ending, with advice."""
     advice = ADVICE.get(path.suffix.lower())
     return InputError(f"{path}: unknown ending '{path.suffix}'; {advice or f'trials are {known}'}")
 
@@ -166,7 +166,7 @@ def read_table(path: Path, most: int = limits.NUMBERS) -> Table:
 
 
 def read_frame(path: Path, most: int = limits.NUMBERS) -> tuple[polars.DataFrame, Dialect | None]:
-    """A Parquet or CSV file, whatever its columns hold, and how a CSV file is written.
+    """Read a Parquet or CSV file, whatever its columns hold, and return also the dialect of a CSV file.
 
     Raises:
         InputError: a truncated or too large file.

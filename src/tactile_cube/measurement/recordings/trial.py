@@ -34,7 +34,7 @@ class Load:
 
 
 def load_of(held: HeldObject, grasp: Grasp) -> Load:
-    """The recording's object as a trial has it."""
+    """Return the recording's object with the values that a trial's grasp overrides."""
     size = held.size if grasp.size is None else grasp.size
     return Load(
         size=np.broadcast_to(np.asarray(size, dtype=np.float64), (3,)).copy(),
@@ -109,7 +109,7 @@ class Trial(TrialColumns):
         return np.stack([np.convolve(column, lever[::-1], mode="valid") for column in padded.T], axis=1)
 
     def with_earlier_commands(self, rows: int) -> Self:
-        """The trial with its commands so many rows earlier; of its last rows nothing is known then."""
+        """Return the trial with its commands `rows` rows earlier; its last `rows` rows become invalid."""
         later = np.minimum(np.arange(len(self.valid)) + rows, len(self.valid) - 1)
         feedforward = None if self.feedforward is None else self.feedforward[later]
         known = np.arange(len(self.valid)) < len(self.valid) - rows

@@ -32,7 +32,7 @@ class ContactModel:
     values: Mapping[str, Mapping[str, float]]
 
     def apply(self, constants: EpisodeConstants) -> EpisodeConstants:
-        """The constants of an episode with these effects."""
+        """Return the constants of an episode with these effects."""
         for name, values in self.values.items():
             constants = contact_catalogue()[name].apply(constants, values)
         return constants
@@ -45,7 +45,7 @@ class ContactModel:
 
 
 def contact_of(model: ModelFile | None) -> ContactModel:
-    """What a model file says about fingertips and object."""
+    """Return the contact model of a model file: its effects on fingertips and object."""
     effects = model.object_effects if model is not None else []
     return ContactModel({one.name: {key: e.value for key, e in one.parameters.items()} for one in effects})
 
@@ -88,9 +88,9 @@ class HandReplay:
         self._world.close()
 
     def simulate(self, trial: Trial, contact: ContactModel, offset: Array, until: float = np.inf) -> Simulated:
-        """One trial with an object from its measured start, to `until` [s] at least.
+        """Simulate one trial with an object from its measured start, to `until` [s] at least.
 
-        The sensors read `offset` (joints,) [rad] too much.
+        The sensors' readings are too large by `offset` (joints,) [rad].
         """
         load = trial.load
         assert load is not None, "only trials with an object are simulated here"

@@ -20,13 +20,13 @@ EffectClass = type[Effect]
 
 
 def effect_path(effect: EffectClass) -> str:
-    """The name by which `find_effect` finds an effect: that of the catalogue, or the dotted path of a user's class."""
+    """Return the name by which `find_effect` finds an effect: of the catalogue, or a user class's dotted path."""
     known = effect.stage is Stage.CONTACT or catalogue().get(effect.name) is effect
     return effect.name if known else f"{effect.__module__}.{effect.__qualname__}"
 
 
 def effect_label(effect: EffectClass, joint: str) -> str:
-    """As a user writes it: `backlash@q2`, `my_rig.CableDrag@q2`, `lateral_friction`."""
+    """Return the label as a user writes it: `backlash@q2`, `my_rig.CableDrag@q2`, `lateral_friction`."""
     return effect_path(effect) if effect.stage is Stage.CONTACT else f"{effect_path(effect)}@{joint}"
 
 
@@ -84,7 +84,7 @@ class Model:
     offsets: Mapping[int, Array]
 
     def with_offsets(self, known: Mapping[int, Array]) -> Model:
-        """The model with these joint offsets [rad] in initialisations of which it has none."""
+        """Return the model with these joint offsets [rad] in initialisations for which it has none."""
         return replace(self, offsets={**known, **self.offsets})
 
 
@@ -94,10 +94,10 @@ TORQUE_MODE_GAIN = 1e-6  # [N m/rad] a commanded torque u is the position u / ga
 
 
 def nominal_model(recording: Recording, known: ModelFile | None = None) -> Model:
-    """What the recording's owner states, or what is known since; of effects, numbers with an interval are free.
+    """Build the model of the owner's values or those in `known`; effect parameters with an interval are free.
 
-    They are expected where they were found, and twice as far from there as the interval says: a machine changes between
-    two recordings. Else what was found on one would soak up what is new in another.
+    Their prior is centred at the known value and twice as wide as the interval states: a machine changes between two
+    recordings. Without this prior, known effects would absorb what is new in another recording.
     """
     constants = {key: np.array([one.value for one in row]) for key, row in _estimates(recording, known).items()}
     terms = []
@@ -121,9 +121,9 @@ def no_offsets(recording: Recording) -> dict[int, Array]:
 def draw_model(
     recording: Recording, known: ModelFile | None, spread: Mapping[str, float], rng: np.random.Generator
 ) -> Model:
-    """One randomised model about the owner's values; what has an interval in `known` is drawn from that.
+    """Draw one randomised model about the owner's values; parameters with an interval in `known` are drawn from it.
 
-    `spread` is the relative half width of a constant without an interval; its `offset` that of joint offsets [rad].
+    `spread` has the relative half widths of constants without an interval; its `offset` is that of joint offsets [rad].
     """
     constants = {
         key: np.array([_drawn(one, spread.get(key, 0.0), rng) for one in row])

@@ -50,7 +50,7 @@ def gaps(plant: Plant, memory: Array) -> Array:
 
 
 def free_way(plant: Plant, memory: Array, jump: Array, lead: Array, gain: Array) -> Array:
-    """The part of a jump of the command [rad] that a motor makes freely, within the gap of a transmission.
+    """Return the part of a jump of the command [rad] that a motor makes freely within the gap of a transmission.
 
     Memory is (..., size), `jump` (..., n); `lead` and `gain` are the signals LEAD and LOOP_GAIN after the jump.
     """
@@ -99,11 +99,11 @@ def read_out(
 
 
 def before_steps(signals: Array, segment: int, substeps: int) -> tuple[Array, NDArray[np.bool_]]:
-    """What a row would show had its command not changed: the line through the last two steps of the row before.
+    """Extrapolate each row from the last two steps of the row before, as if its command had not changed.
 
-    For a jump of the command that asks for much: `jump_ratio` does not know where a torque meets its limit. From
-    signals of every step (S, K segment substeps, ..., joints), three a row at least since the first one takes the mean
-    of two commands, it gives (S, K segment, ..., joints), and which rows have a row before them (K segment,).
+    For a jump of the command that may saturate the torque, as `jump_ratio` ignores the torque limit. From signals of
+    every step (S, K segment substeps, ..., joints), three a row at least since the first one takes the mean of two
+    commands, it returns (S, K segment, ..., joints), and which rows have a row before them (K segment,).
     """
     shown = signals[:, ::substeps].copy()
     known = np.arange(shown.shape[1]) % segment > 0

@@ -60,7 +60,7 @@ class Path:
 
 
 def free_run(recording: Recording, model: Model, step: float = 0.002) -> list[Simulated]:
-    """Every trial of a recording simulated freely from its start, in steps of `step` [s] at most."""
+    """Simulate every trial of a recording freely from its start, in steps of `step` [s] at most."""
     simulator = Simulator(recording, [term.effect for term in model.terms], step)
     try:
         return simulator.free_runs([model])[0]
@@ -95,13 +95,13 @@ class Simulator:
         self._pool.shutdown()
 
     def finer(self, times: int) -> Self:
-        """The same in steps so many times as short, for windows that are made finer likewise."""
+        """Return the simulator with steps shorter by the factor `times`, for windows that are refined likewise."""
         fine = copy(self)
         fine.plant = Plant([self.tree], self.plant.dt / times, self.plant.effects, self.recording.joints)
         return fine
 
     def free_runs(self, models: Sequence[Model], trials: Sequence[Trial] | None = None) -> list[list[Simulated]]:
-        """Each model through trials of the recording, all by default, from their measured starts."""
+        """Simulate trials of the recording, all by default, with each model freely from their measured starts."""
         trials = self.recording.trials if trials is None else trials
         noise, speed = sensors(self.recording.with_trials(list(trials)))
         windows = whole_trials(self.recording, trials, self.substeps, self.time, noise, speed)
@@ -119,13 +119,13 @@ class Simulator:
         torques: bool = False,
         near: Path | None = None,
     ) -> Array:
-        """Each of M models through its windows (of one shape), with its correction at the start of each segment.
+        """Simulate each of M models in its windows (of one shape), with its correction at the start of each segment.
 
-        Corrections (M, 2 n) are added to positions [rad] and speeds [rad/s]. Models follow the path of one that they
-        are `near` to, at a third of the cost; those of another mechanism go their own way.
+        Corrections (M, 2 n) are added to positions [rad] and speeds [rad/s]. Models take their equations of motion from
+        the path `near` of a neighbour, at a third of the cost; models of another mechanism compute their own.
 
         Returns:
-            What a log would show, (M, 1 or 2, S, K segment, sensors): positions [rad] and, if wanted, torques [N m].
+            Signals as logged, (M, 1 or 2, S, K segment, sensors): positions [rad] and, if wanted, torques [N m].
         """
         out = np.zeros((len(models), 1 + torques, *windows[0].measured.shape))
         self._count(len(models) / (1 if near is None else 3), windows[0])
@@ -139,7 +139,7 @@ class Simulator:
         return out
 
     def path(self, model: Model, windows: Windows) -> Path:
-        """A model's way through windows, which its neighbours may follow."""
+        """Simulate a model in windows and return its path, which its neighbours may follow."""
         out = np.zeros((1, *windows.measured.shape))
         self._count(1.0, windows)
         steps = out.shape[2] * windows.substeps * self.plant.kernel.PATH_WIDTH
@@ -249,7 +249,7 @@ class Simulator:
         return max((min(e.kept(self.plant.dt), longest) if e.bounded_memory else longest for e in effects), default=0)
 
     def _memories(self, model: Model, windows: Windows) -> Array:
-        """One block (S, size) for each window, at rest at its start."""
+        """Return one memory block for each window (S, size), reset to the window's start."""
         single = self.memory(model)
         memory = np.tile(single, (len(windows), 1))
         offsets = np.array([model.offsets[int(k)] for k in windows.initialisation])
@@ -271,7 +271,7 @@ class Simulator:
         return memory
 
     def _jump_ratios(self, memory: Array, windows: Windows) -> tuple[Array, Array]:
-        """What the sensors show at once of a jump of the command, see `jump_ratio`, (S, 1, n) each."""
+        """Return the immediate response of the sensors to a jump of the command, see `jump_ratio`, (S, 1, n) each."""
         first = windows.commands[:, windows.history * windows.substeps]
         _, chosen, which = np.unique(windows.gains, axis=0, return_index=True, return_inverse=True)
         found = np.array([jump_ratio(self.plant, memory[k], first[k]) for k in chosen])[which.ravel(), :, None]

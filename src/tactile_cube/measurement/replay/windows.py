@@ -15,19 +15,19 @@ from tactile_cube.measurement.recordings.trial import Array, Trial
 from tactile_cube.measurement.replay.model import TORQUE_MODE_GAIN
 
 Rows = NDArray[np.int64]
-SEGMENT = 0.4  # [s] identification works best with 0.2-0.5 s: a wrong start is no longer told from a wrong model beyond
+SEGMENT = 0.4  # [s] identification works best with 0.2-0.5 s: beyond, errors of start and model look alike
 WINDOW = 11  # segments simulated without a break, so that effects with a memory keep it
 LEAD = 1  # segments at the beginning of a window that only wake such memories, unless a trial begins there
 HISTORY = 8.0  # [s] of commands before a window at most, for effects that remember them, such as a rate limit
 WAKING = 0.15  # [s] of the first command before a free run, for effects with a memory
 LONGEST_STEP = 0.0021  # [s] of the simulation; of a finger, as all times here
 FEWEST_AROUND = 3  # samples on either side of a start that its speed is read from
-WELL = 0.1  # of the speed that has to be told, where fewer samples than usual are taken
+WELL = 0.1  # of the required accuracy of the speed, where fewer samples than usual are taken
 FEWEST = 4  # samples that a window after a trial's first one needs
 NO_LINKS = np.zeros(0, dtype=np.int64)
 SMOOTHING = 0.025  # [s] half width of the polynomial that reads the speed at a segment's start
 START_SPEED = 0.02  # [rad/s] how well the speed at a segment's start is known beforehand
-SAFE = 0.25  # part of the torque limit below which a jump of the command is answered in proportion
+SAFE = 0.25  # part of the torque limit below which the torque is proportional to a jump of the command
 UNSTEADY = 0.125  # [s] after a step of the command: a drive's delay, and what a speed is read from
 MANY = 12  # samples around a start that suffice for a polynomial of fourth degree
 
@@ -104,7 +104,7 @@ class Windows:
         return replace(self, **{key: getattr(self, key)[chosen] for key in ROWS}, **picked)
 
     def first_segments(self) -> Windows:
-        """The first segment of each window alone."""
+        """Return only the first segment of each window."""
         rows = slice(self.segment)
         return replace(
             self,
@@ -129,10 +129,10 @@ def cut(
     time: float = 1.0,
     speed: Array | float = np.inf,
 ) -> Windows:
-    """The trials of a recording, all by default, as windows of segments of `segment` rows, short ones by default.
+    """Cut trials of a recording, all by default, into windows of segments of `segment` rows, short ones by default.
 
-    `noise` (n,) [rad] is the standard deviation of each joint's position sensor, (2 n,) with those on links, `time`
-    what a second of a finger stands for [s]; speeds are to be known as well as `speed` (n,) [rad/s] at their starts.
+    `noise` (n,) [rad] is the standard deviation of each joint's position sensor, (2 n,) with those on links; `time` [s]
+    corresponds to a second of a finger; `speed` (n,) [rad/s] is the required accuracy of speeds at segments' starts.
     """
     trials = recording.trials if trials is None else trials
     longest = max(len(trial.time) for trial in trials)
@@ -155,10 +155,10 @@ def whole_trials(
     noise: Array | float = 1.0,
     speed: Array | float = np.inf,
 ) -> Windows:
-    """Each trial as a window of one segment, simulated freely from its measured start.
+    """Make each trial a window of one segment, simulated freely from its measured start.
 
-    Shorter ones hold their last command until the longest one has ended. The speed at a start is read from
-    as few samples as the noise of the sensors (n,) [rad] lets tell it, as well as `speed` (n,) [rad/s].
+    Shorter trials hold their last command until the longest one has ended. The speed at a start is estimated from
+    as few samples as the sensor noise (n,) [rad] permits for an accuracy of `speed` (n,) [rad/s].
     """
     longest = max(len(trial.time) for trial in trials)
     history = round(WAKING / recording.step)
@@ -238,7 +238,7 @@ def _pieces(recording: Recording, trial: Trial, index: int, sizes: Cut) -> Itera
 
 
 def _shown(trial: Trial, links: Rows) -> tuple[Array, NDArray[np.bool_]]:
-    """What a trial's sensors read (T, M) [rad], and which of them it has (M,)."""
+    """Return the readings of a trial's sensors (T, M) [rad], and which of the sensors it has (M,)."""
     if not len(links):
         return trial.position, np.ones(trial.position.shape[1], dtype=bool)
     both = trial.position[:, links] if trial.link_position is None else trial.link_position[:, links]
@@ -248,7 +248,7 @@ def _shown(trial: Trial, links: Rows) -> tuple[Array, NDArray[np.bool_]]:
 
 
 def _as_positions(recording: Recording, trial: Trial) -> Array:
-    """A trial's commands (T, n) as positions [rad], with what a feed-forward torque adds at the stated stiffness."""
+    """Return a trial's commands (T, n) as positions [rad], plus feed-forward torque over the stated stiffness."""
     if recording.torque_controlled:
         added = 0.0 if trial.feedforward is None else trial.feedforward
         return np.asarray((trial.command + added) / TORQUE_MODE_GAIN)
@@ -258,7 +258,7 @@ def _as_positions(recording: Recording, trial: Trial) -> Array:
 
 
 def _as_simulated(recording: Recording, trial: Trial, substeps: int) -> tuple[Array, Array]:
-    """What a trial's steps take (T, substeps, n), and the jump of the command at each reading (T, n)."""
+    """Return the commands of a trial's steps (T, substeps, n), and the jump of the command at each reading (T, n)."""
     before, after = _around(_as_positions(recording, trial), recording.read)
     drive = _drive(recording, trial)
     most = drive.limit / np.maximum(drive.kp, np.finfo(float).tiny)
@@ -272,7 +272,7 @@ def _as_simulated(recording: Recording, trial: Trial, substeps: int) -> tuple[Ar
 
 
 def _rows(fine: Array, first: int, last: int) -> Array:
-    """Rows of a trial's commands (T, substeps, n); before the trial its first command, after it the last one."""
+    """Return rows of a trial's commands (T, substeps, n); before the trial its first command, after it the last one."""
     wanted = np.arange(first, last)
     chosen = fine[np.clip(wanted, 0, len(fine) - 1)]
     chosen[wanted < 0] = fine[0, 0]
@@ -286,7 +286,7 @@ def steps_per_row(recording: Recording, time: float = 1.0) -> int:
 
 
 def asks_for_much(jump: Array, kp: Array, limit: Array) -> NDArray[np.bool_]:
-    """Where a jump of the command (..., n) [rad] may take a torque to its limit (..., n)."""
+    """Return where a jump of the command (..., n) [rad] may bring a torque to its limit (..., n)."""
     return np.asarray(kp * np.abs(jump) > SAFE * limit)
 
 
@@ -327,10 +327,10 @@ def _around(command: Array, reading: str) -> tuple[Array, Array]:
 
 
 def _half_width(step: float, noise: Array, speed: Array | float, time: float) -> int:
-    """Rows on either side of a start that its speed is read from.
+    """Return the number of rows on either side of a start from which its speed is estimated.
 
-    Fewer than usual where so few tell it well beyond need, for where a speed changes fast a polynomial misreads it.
-    More, and up to half a segment, where the usual ones leave it too noisy: dry friction asks for its sign.
+    Fewer than usual if these are accurate well beyond need, as a polynomial misfits a speed that changes fast.
+    More, up to half a segment, if the usual number leaves the speed too noisy: dry friction depends on its sign.
     """
     usual, most = _usual(step, time), round(0.5 * SEGMENT * time / step)
     if not np.all(np.isfinite(speed)):
@@ -341,12 +341,12 @@ def _half_width(step: float, noise: Array, speed: Array | float, time: float) ->
 
 
 def _usual(step: float, time: float) -> int:
-    """Rows on either side of a start that its speed is read from where nothing else is known."""
+    """Return the default number of rows on either side of a start from which its speed is estimated."""
     return max(2, round(SMOOTHING * time / step))
 
 
 def _tells(step: float, half: int, noise: Array, speed: Array | float) -> bool:
-    """Whether so many rows on either side tell a speed as well as `speed`."""
+    """Return whether `half` rows on either side are enough to estimate a speed with the accuracy `speed`."""
     basis = np.vander(step * np.arange(-half, half + 1), _terms(half), increasing=True)
     return bool(np.all(np.linalg.norm(np.linalg.pinv(basis)[1]) * noise <= speed))
 

@@ -51,19 +51,19 @@ class ColumnMap:
 
 
 def time_of(names: Sequence[str]) -> str | None:
-    """The column of time, by its name."""
+    """Return the column of time, found by its name."""
     return min((name for name in names if _signal_of(name) == "time"), key=lambda name: len(words(name)), default=None)
 
 
 def map_columns(
     names: Sequence[str], joints: Sequence[str], given: Given, mode: str = "position", flags: Collection[str] = ()
 ) -> ColumnMap:
-    """The map of a table's columns: joints as `given`, or else all of `joints` that the names of columns show.
+    """Map a table's columns to joints: as `given`, or else to all of `joints` that appear in the columns' names.
 
-    `flags` are columns of 0 and 1 alone, which are no torques; in mode `free` no command is needed.
+    `flags` are columns of only 0 and 1, which are not torques; in mode `free` no command is needed.
 
     Raises:
-        InputError: something is missing or can be read in two ways.
+        InputError: something is missing or ambiguous.
     """
     said = {joint: dict(entry) for joint, entry in given.items() if isinstance(entry, Mapping)}
     if other := given.keys() - said.keys() - {"time"}:
@@ -178,7 +178,7 @@ def _require_whole(chosen: Mapping[str, Mapping[str, str]], names: Sequence[str]
 
 
 def _signal_of(name: str) -> str | None:
-    """What a column's name promises: time, one of SIGNALS, torque_command, voltage or None."""
+    """Return the signal that a column's name indicates: time, one of SIGNALS, torque_command, voltage or None."""
     said = words(name)
     if TIME & set(said) or (said[:1] == ["t"] and len(said) <= 2):
         return "time"

@@ -105,7 +105,7 @@ class CsvFiles(Mechanism):
     kind: Sequence[str] | None
 
     def recordings(self, seed: int) -> dict[str, RecordingTables]:
-        """One recording of all files."""
+        """Build one recording of all files."""
         mode, rig = self.controller.mode, self.rig()
         if mode != "voltage" and (self.controller.kt or self.controller.R):
             raise InputError(f"source.controller.mode={mode}: kt and R are of mode=voltage; say that or leave them out")
@@ -228,7 +228,7 @@ class CsvFiles(Mechanism):
         return [replace(trial, entry=entry) for trial, entry in zip(trials, entries, strict=True)]
 
     def _description(self, trials: Sequence[TrialTable], joints: list[str], rig: Rig, rate: float) -> Description:
-        """What recording.yaml is to say; gains that nobody states are unknown, and begin where the log has them."""
+        """Build the content of recording.yaml; gains not stated are unknown and start from estimates of the log."""
         mode, stated = self.controller.mode, self.controller.model_dump(exclude={"kt", "R"}, exclude_none=True)
         said = with_stated({**stated, "mode": "torque" if mode == "free" else mode}, rig.gains, joints)
         nominal = with_stated(self.nominal, rig.nominal, joints)
@@ -309,7 +309,7 @@ def _begins_in_motion(trial: TrialTable) -> bool:
 def _doubts(
     units: Units, columns: ColumnMap, trials: Sequence[TrialTable], description: Description, rig: Rig
 ) -> Iterator[str]:
-    """What units and gains leave open; a torque that goes with the controller's law needs no other proof."""
+    """Yield doubts about units and gains; a torque that agrees with the controller's law needs no other proof."""
     try:
         gains = gains_of(description, None, "controller")
     except ValueError:  # which is said when the recording is read
@@ -371,7 +371,7 @@ COARSE = 0.005  # [s] between samples is enough to tell two commands apart
 
 
 def kinds_of(names: Sequence[str], commands: Sequence[Array], step: float) -> list[str]:
-    """The kind of each log: logs of one name but for a number or a date, if their commands (n, joints) agree."""
+    """Return each log's kind: logs of one name except a number or date are one kind if commands (n, joints) agree."""
     words = [COUNT.sub("", DATE.sub("_", name)).strip("_ .-") or NO_NAME for name in names]
     stride = max(1, round(COARSE / step))
     coarse = [command[::stride] for command in commands]

@@ -95,7 +95,7 @@ def _loop(error: Array, links: Array, v: Array, a: Array, inertia: float) -> tup
 
 
 def gain_doubts(kp: Array, found: Mapping[str, Sequence[float]], unknown: bool) -> Iterator[str]:
-    """What to say of stated gains (joints,) that the links contradict, or of unknown ones that they leave open."""
+    """Yield doubts about stated gains (joints,) that the links contradict, or unknown ones that are unidentifiable."""
     if unknown and min(found["told"]) < TELLING:
         yield "the links' weight and inertia tell little of kp: of gains and inertia only the ratios are known"
     for one, seen, told in zip(kp, found["kp"], found["told"], strict=True):

@@ -50,10 +50,10 @@ class Log:
 
 
 def read_logs(path: Path) -> list[Log]:
-    """The logs in a file, or those of a LeRobot data set in a folder.
+    """Read the logs in a file, or those of a LeRobot data set in a folder.
 
     Raises:
-        InputError: a missing, truncated or too large file, or one that is not read.
+        InputError: a missing, truncated or too large file, or one of an unknown format.
     """
     if path.is_dir():
         if not (path / LEROBOT).is_file():

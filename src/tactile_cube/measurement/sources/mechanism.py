@@ -26,7 +26,7 @@ ROBOTS = {
     "slide": "slides on a level rail",
 }
 LEVER = 0.1  # [m] from the axis to the mass, a guess
-UNIT_GAIN = 1.0  # [N m/rad] in the place of a gain that nobody states: everything else is in proportion to it
+UNIT_GAIN = 1.0  # [N m/rad] used for a gain that is not stated: everything else is in proportion to it
 OF_LINK = {"pendulum": 0.5, "wheel": 0.1, "slide": 0.1}
 """Part of the inertia that is the link's; the rest, free, is the rotor's."""
 HANGS = 0.837  # part of the error that must be left for another zero than that of the log

@@ -44,7 +44,7 @@ class RosBag:
     read: Literal["before", "after"]
 
     def recordings(self, seed: int) -> dict[str, RecordingTables]:
-        """One recording of all bags."""
+        """Build one recording of all bags."""
         rig, joints = read_rig(Path(self.urdf)), list(self.joints)
         tables = [self._trial(Path(name), joints) for name in listed(self.files)]
         rate = self.rate if self.rate is not None else rate_of(tables[0].time, 2, str(tables[0].entry.note))

@@ -58,7 +58,7 @@ class SimulatedGrasp(SimulatedSession):
     engine: EngineName = "bullet"
 
     def recordings(self, seed: int) -> dict[str, RecordingTables]:
-        """The recording, and a further initialisation under `validation`."""
+        """Simulate the recording, and a further initialisation under `validation`."""
         unknown = set(self.kinds) - set(HOLDING) - set(EXCITATIONS)
         if unknown:
             known = ", ".join([*HOLDING, *EXCITATIONS])
@@ -103,7 +103,7 @@ class _Session:
     rng: np.random.Generator
 
     def initialisation(self, number: int, folder: str, commands: Mapping[str, Array]) -> list[TrialTable]:
-        """Every free motion and every load once, with the joint offsets of a new initialisation."""
+        """Simulate every free motion and every load once, with the joint offsets of a new initialisation."""
         s = self.settings
         offset = self.rng.uniform(-s.offset, s.offset, len(DLR_HAND2.joint_names))
         tables = [

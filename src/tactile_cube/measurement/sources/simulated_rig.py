@@ -51,7 +51,7 @@ class SimulatedSession:
     def described(
         self, gravity: Iterable[float], joints: list[str], coupled: Mapping[str, Coupling], **more: object
     ) -> Description:
-        """What recording.yaml is to say of a rig with these joints."""
+        """Build the content of recording.yaml for a rig with these joints."""
         return described(
             gravity=list(gravity), rate_hz=self.rate, joints=joints, coupled=coupled,
             controller=dict(self.controller), nominal=dict(self.nominal),
@@ -89,7 +89,7 @@ class SimulatedSession:
         return self.logged(entry, command, Simulated(result.position[settle:], result.torque[settle:]), rng)
 
     def logged(self, entry: TrialEntry, command: Array, result: Simulated, rng: np.random.Generator) -> TrialTable:
-        """A simulated trial, (n, joints) each, as the sensors log it."""
+        """Return a simulated trial, (n, joints) each, as the sensors log it."""
         position = result.position + rng.normal(0, self.noise, command.shape)
         if self.resolution > 0:
             position = np.round(position / self.resolution) * self.resolution
@@ -98,13 +98,13 @@ class SimulatedSession:
 
 
 def unmeasured(description: Description, rig: Rig, constants: Mapping[str, Array]) -> Recording:
-    """The rig as a recording without trials, as the simulators want it."""
+    """Return the rig as a recording without trials, as the simulators require it."""
     gains = Gains(constants["kp"], constants["kd"], constants["torque_limit"])
     return Recording(Path(), description, rig, gains, {}, ())
 
 
 def silent_trial(command: Array, rig: Recording, entry: TrialEntry) -> Trial:
-    """A trial that starts at rest at its first command (joints,) [rad]."""
+    """Return a trial that starts at rest at its first command (joints,) [rad]."""
     time = np.arange(len(command)) / rig.rate
     still = np.broadcast_to(command[0], command.shape)
     signals, valid = (time, command, still, np.zeros_like(command)), np.ones(len(command), dtype=bool)
@@ -121,7 +121,7 @@ class SimulatedRig(SimulatedSession):
     joints: Sequence[str] | None = None
 
     def recordings(self, seed: int) -> dict[str, RecordingTables]:
-        """The recording, and fresh commands on the last initialisation under `validation`."""
+        """Simulate the recording, and fresh commands on the last initialisation under `validation`."""
         rng, rig = np.random.default_rng(seed), self.rig()
         description = self.description(rig)
         joints = tuple(description.joints)
@@ -154,14 +154,14 @@ class SimulatedRig(SimulatedSession):
         return result
 
     def rig(self) -> Rig:
-        """The mechanism; raises an `InputError` where the URDF cannot be read."""
+        """Read the mechanism; raise an `InputError` if the URDF cannot be read."""
         if self.urdf in BUILT_IN:
             return parse_rig(BUILT_IN[self.urdf](), Path(f"{self.urdf}.urdf"))
         shipped = DESCRIPTIONS / self.urdf
         return read_rig(shipped if shipped.is_file() and not Path(self.urdf).is_file() else Path(self.urdf))
 
     def description(self, rig: Rig) -> Description:
-        """What recording.yaml is to say; by default all joints that mimic no other are actuated."""
+        """Build the content of recording.yaml; by default all joints that mimic no other are actuated."""
         followers = {name: joint.mimics for name, joint in rig.joints.items() if joint.mimics is not None}
         joints = [name for name in rig.joints if name not in followers] if self.joints is None else list(self.joints)
         coupled = {name: Coupling(joint=leader) for name, leader in followers.items() if leader in joints}

@@ -30,21 +30,21 @@ class Source(Protocol):
 
 
 def described(**values: object) -> Description:
-    """A checked description whose trials are to come from the tables."""
+    """Build a checked description whose trials are added later from the tables."""
     return Description.model_validate({"format": 1, "trials": PLACEHOLDER} | values)
 
 
 def with_stated(
     said: Mapping[str, Value | None], stated: Mapping[str, Mapping[str, float]], joints: Sequence[str]
 ) -> dict[str, Any]:
-    """What the user says, and what the rig's file states of all joints; a limit that is infinite says nothing."""
+    """Merge the user's values over those in the rig's file for all joints; an infinite limit overrides no other."""
     of_file = {key: {joint: row[joint] for joint in joints} for key, row in stated.items() if row.keys() >= set(joints)}
     given = {key: value for key, value in said.items() if value is not None}
     return of_file | {key: value for key, value in given.items() if value != float("inf") or key not in of_file}
 
 
 def listed(files: str | Iterable[str]) -> list[str]:
-    """One file or several as a list."""
+    """Return one file or several as a list."""
     return [files] if isinstance(files, str) else [str(one) for one in files]
 
 

@@ -87,7 +87,7 @@ def _merged(logs: Sequence[Log]) -> Log:
 
 
 def without_equal_rows(log: Log, columns: ColumnMap) -> Log:
-    """The log without rows that say again what the row before them says, time included."""
+    """Return the log without rows that are equal to the row before them, time included."""
     if columns.time is None or len(log.table[columns.time]) < 2:
         return log
     used = np.stack([log.table[name] for name in columns.names if name in log.table], axis=1)
@@ -99,16 +99,16 @@ def without_equal_rows(log: Log, columns: ColumnMap) -> Log:
 
 
 def trials_of(log: Log, columns: ColumnMap, second: float, free: bool) -> list[Log]:
-    """The trials in a log without equal rows: cut at episodes, restarts and gaps of time, and where torque is switched.
+    """Cut a log without equal rows into trials: at episodes, restarts and gaps of time, and where torque is switched.
 
     Args:
         log: of one file.
         columns: which are used.
         second: size of the unit of time [s].
-        free: trials without torque are wanted, and not those with it.
+        free: keep the trials without torque, and not those with it.
 
     Raises:
-        InputError: too much of it lies in pieces that are too short.
+        InputError: too many rows lie in pieces that are too short.
     """
     if columns.time is None:
         return [log]
@@ -132,7 +132,7 @@ def trials_of(log: Log, columns: ColumnMap, second: float, free: bool) -> list[L
 
 
 def _restarts(log: Log, columns: ColumnMap, second: float, labels: Sequence[str], most: float) -> Mask:
-    """Where time goes back by more than `most` [s] to where it began (n - 1,); anywhere else rows are in disorder."""
+    """Find where time goes back by more than `most` [s] to its start (n - 1,); raise InputError for disorder."""
     time = log.table[str(columns.time)] * second
     steps = np.diff(time)
     back = (steps < -most) & ~_differ(labels, len(steps))

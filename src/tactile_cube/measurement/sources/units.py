@@ -37,7 +37,7 @@ NO_TORQUE |= {"enable", "enabled", "flag", "mode", "limit"}
 """Words of a name that say that it is no torque."""
 RANGE, LEROBOT = "range", re.compile(r"(action|observation)(?![a-z])", re.IGNORECASE)
 TICKS = frozenset({"tick", "ticks", "count", "counts", "raw"})
-USUAL_TICKS, FEWEST_TICKS = 4096, 16  # of a turn: of hobby servos, and of any encoder that tells an angle
+USUAL_TICKS, FEWEST_TICKS = 4096, 16  # of a turn: of hobby servos, and of any encoder that measures an angle
 GEARED = 1.5  # turns of a motor a turn of its link, from which on there is a gear between them
 SLOWEST = 0.1  # [s] between samples of a log that shows a drive
 NOT_ALIKE = 0.05  # range of a position over that of its command, below which they are in different units
@@ -49,7 +49,7 @@ def words(name: str) -> list[str]:
 
 
 def of_motor(name: str) -> bool:
-    """Whether a column's name says that it is the motor's."""
+    """Return whether a column's name indicates that it is the motor's."""
     return bool({"motor", "mot", "rotor"} & set(words(name)))
 
 
@@ -69,12 +69,12 @@ class Unit:
         return self.source.startswith(("its name", "source."))
 
     def of(self, values: Array) -> Array:
-        """Values in SI units."""
+        """Convert values to SI units."""
         return (values - self.zero) * self.size
 
 
 def chosen_unit(said: str | int | None, name: str, units: Mapping[str, float], key: str) -> Unit | None:
-    """The unit that the user or else the column's name says.
+    """Return the unit that the user states, or else that in the column's name.
 
     Raises:
         InputError: no such unit.
@@ -267,7 +267,7 @@ def torque_unit(said: str | None, name: str, prismatic: bool, values: Array) -> 
 
 
 def is_flag(values: Array) -> bool:
-    """Whether a column holds both 0 and 1, and nothing else."""
+    """Return whether a column holds both 0 and 1, and nothing else."""
     return bool(np.isin(values, (0.0, 1.0)).all() and np.ptp(values) > 0)
 
 
