@@ -29,7 +29,7 @@ PIPE_CLOSED = 141  # exit status of a program that writes to a closed pipe, as s
 
 
 def command_line(name: str) -> Callable[[], None]:
-    """The command line of a function of `commands`; its configuration is conf/<name>.yaml."""
+    """Return the command line of a function of `commands`; its configuration is conf/<name>.yaml."""
 
     @quiet_when_nobody_reads()
     def main() -> None:
@@ -96,7 +96,7 @@ def _refuse_plain_words(name: str, words: list[str]) -> None:
 
 
 def _guarded(name: str, wants_traceback: bool, config: DictConfig, folder: Path) -> float | None:
-    """One job, its errors in one line: inside Hydra, which otherwise adds lines of its own."""
+    """Run one job and report its errors in one line: inside Hydra, which otherwise adds lines of its own."""
     log = folder / f"{name}.log"
     configuration = configuration_in(folder, config, log.name)
     with configuration, quiet_when_nobody_reads(), console_kept_in(log), _errors_in_one_line(wants_traceback):
@@ -120,6 +120,6 @@ def _errors_in_one_line(wants_traceback: bool) -> Iterator[None]:
 
 
 def fail(message: str) -> NoReturn:
-    """One line on stderr, exit code 2."""
+    """Print one line to stderr and exit with code 2."""
     print(f"error: {message}", file=sys.stderr)
     sys.exit(USAGE_ERROR)

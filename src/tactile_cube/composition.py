@@ -25,7 +25,7 @@ RECIPE = {"train": "curriculum"}  # the experiment that a command takes where th
 
 
 def help_text(name: str) -> str:
-    """What `--help` prints of a command: its groups and keys."""
+    """Return the text of a command's `--help`: its groups and keys."""
     path = CONFIG / f"{name}.yaml"
     lines = [line for line in path.read_text().splitlines() if line and line[0] not in " #-"]
     keys = [f"  {line}" for line in lines if not line.startswith("defaults:")]
@@ -64,7 +64,7 @@ def _group_lines(path: Path) -> list[str]:
 
 
 def _summary(file: Path) -> str:
-    """The first sentence of the comment that a configuration file begins with."""
+    """Return the first sentence of the comment at the top of a configuration file."""
     comment = []
     for line in file.read_text().splitlines():
         if not line.startswith("#"):
@@ -90,13 +90,13 @@ if TYPE_CHECKING:
 
 
 def composed(name: str | None, settings: Sequence[str], with_hydra: bool = False) -> DictConfig:
-    """The configuration of a command with some of its settings chosen, e.g. "task=table", "seed=1".
+    """Compose the configuration of a command with overrides, e.g. "task=table", "seed=1".
 
-    A Hydra application that calls this keeps its own. Without a name it is nothing but what `settings` add;
-    `with_hydra` also gives Hydra's own part, which names run folder and choices.
+    A Hydra application that calls this keeps its own instance. Without a name, only what `settings` add is composed;
+    `with_hydra` includes Hydra's own part, which names run folder and choices.
 
     Raises:
-        hydra.errors.HydraException: a setting that there is not.
+        hydra.errors.HydraException: a setting does not exist.
     """
     from hydra import compose, initialize_config_dir
     from hydra.core.global_hydra import GlobalHydra
@@ -126,7 +126,7 @@ def refuse_unknown_keys(name: str, config: DictConfig) -> None:
 
 
 def with_recipe(name: str, words: list[str]) -> list[str]:
-    """The words of a command line, with the command's recipe in front of the first `key=value` unless they choose one.
+    """Return a command line's words with the recipe in front of the first `key=value`, unless they choose one.
 
     Example:
         >>> with_recipe("train", ["train", "seed=1", "--cfg", "job"])

@@ -72,7 +72,7 @@ class GymnasiumRotation(gymnasium.Env[Observation, Observation]):
         return data["observation"][0].numpy().copy(), _info(data, self._terms)
 
     def step(self, action: Observation) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """One policy step of 0.1 s.
+        """Run one policy step of 0.1 s.
 
         Raises:
             InputError: an action of another shape, or one that is no number.

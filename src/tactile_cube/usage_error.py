@@ -39,7 +39,7 @@ def usage_error(error: BaseException) -> str | None:
 
 
 def _causes(error: BaseException | None) -> Iterator[BaseException]:
-    """An error and what it came of; Hydra's may come of each other in a circle."""
+    """Yield an error and its causes; Hydra's may cause each other in a circle."""
     known = set[int]()
     while error is not None and id(error) not in known:
         known.add(id(error))

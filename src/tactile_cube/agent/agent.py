@@ -16,7 +16,7 @@ from tactile_cube.errors import InputError
 
 
 def multiplies_bfloat16() -> bool:
-    """Whether oneDNN has bfloat16 products for this CPU (AVX-512 and newer); they are slow elsewhere."""
+    """Return whether oneDNN has bfloat16 products for this CPU (AVX-512 and newer); they are slow elsewhere."""
     return bool(torch.ops.mkldnn._is_mkldnn_bf16_supported())
 
 
@@ -45,7 +45,7 @@ class AgentSettings(BaseModel):
     device: str = Field(default="cpu", pattern=r"^(cpu|cuda(:\d+)?)$")
 
     def torch_device(self) -> torch.device:
-        """The device, if it is there.
+        """Return the device, if it is available.
 
         Raises:
             InputError: a GPU is asked for and torch finds none.
@@ -62,7 +62,7 @@ class AgentSettings(BaseModel):
         return torch.bfloat16 if self.precision == "bf16" else torch.float32
 
     def optimizer(self, networks: list[Tensor], log_alpha: Tensor) -> torch.optim.AdamW:
-        """One fused AdamW for networks and temperature, whose weight decay spares the temperature."""
+        """Make one fused AdamW for networks and temperature, without weight decay of the temperature."""
         rate = self.alpha_learning_rate or self.learning_rate
         groups: list[dict[str, Any]] = [
             {"params": networks},
@@ -108,12 +108,12 @@ class Agent(ABC):
         """Let the target critics follow the critics by `settings.tau`."""
 
     def update(self, batch: TensorDictBase, actor: bool = True) -> dict[str, Tensor]:
-        """One gradient step of critics, actor and temperature, then of the target critics.
+        """Take one gradient step of critics, actor and temperature, then update the target critics.
 
         Args:
             batch: replayed transitions (size,), as TorchRL's losses read them. The reward sums "steps_to_next_obs"
                 discounted ones, "terminated" leaves out time limits, "demonstrated" marks demonstrations.
-            actor: whether actor and temperature take part.
+            actor: whether actor and temperature are updated too.
 
         Returns:
             Scalars on the agent's device: critic_loss, actor_loss (without imitation), alpha, entropy, value.
@@ -138,11 +138,11 @@ class Agent(ABC):
         }
 
     def policy(self) -> Actor:
-        """A copy of the actor on the CPU, detached from the learner."""
+        """Return a copy of the actor on the CPU, detached from the learner."""
         return copy.deepcopy(self.actor).cpu().requires_grad_(False)
 
     def state_dict(self) -> dict[str, Any]:
-        """Everything needed to go on bit for bit: networks, targets, temperature, optimiser."""
+        """Return all state for a bit-for-bit resume: networks, targets, temperature, optimiser."""
         return {"loss": self.loss.state_dict(), "optimizer": self.optimizer.state_dict()}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:

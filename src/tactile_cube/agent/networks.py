@@ -75,18 +75,18 @@ class Actor(nn.Module):
         return mean, log_scale(raw)
 
     def sample(self, observation: Tensor) -> Draw:
-        """The policy as it explores; noise is drawn from torch's global generator."""
+        """Sample actions with exploration; the noise is drawn from torch's global generator."""
         mean, log_sigma = self._gaussian(observation)
         noise = torch.randn_like(mean)
         pre_tanh = mean + log_sigma.exp() * noise
         return Draw(torch.tanh(pre_tanh), squashed_log_prob(noise, log_sigma, pre_tanh), torch.tanh(mean))
 
     def layers(self) -> list[nn.Linear]:
-        """The linear layers, the first one first."""
+        """Return the linear layers, the first one first."""
         return [layer for layer in self.body if isinstance(layer, nn.Linear)]
 
     def deterministic(self, observation: Tensor) -> Tensor:
-        """The policy without exploration: tanh of the mean, (batch, action)."""
+        """Return the actions without exploration: tanh of the mean, (batch, action)."""
         mean: Tensor = self.forward(observation)[0]
         return torch.tanh(mean)
 
@@ -105,7 +105,7 @@ class Critic(nn.Module):
 
 
 def lowest(critics: Iterable[nn.Module], observation: Tensor, privileged: Tensor, action: Tensor) -> Tensor:
-    """The lower of the critics' values (batch, 1)."""
+    """Return the lowest of the critics' values (batch, 1)."""
     return torch.stack([critic(observation, privileged, action).float() for critic in critics]).amin(0)
 
 

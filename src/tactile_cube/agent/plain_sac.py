@@ -59,7 +59,7 @@ class PlainLoss(nn.Module):
         }
 
     def follow(self) -> None:
-        """Targets move towards the critics by tau."""
+        """Move the targets towards the critics by tau."""
         self.targets.update_parameters(self.critics)
 
 
@@ -69,9 +69,9 @@ class PlainSac(Agent):
     loss: PlainLoss
 
     def build_loss(self, critics: list[Critic]) -> PlainLoss:
-        """The plain loss."""
+        """Make the plain loss on the device."""
         return PlainLoss(self.actor, critics, self.settings).to(self.device)
 
     def follow(self) -> None:
-        """By tau."""
+        """Let the target critics follow the critics by tau."""
         self.loss.follow()

@@ -88,7 +88,7 @@ class PolicyInfo(BaseModel):
         )
 
     def shapes(self) -> dict[str, tuple[int, ...]]:
-        """The tensors of the file by name."""
+        """Return the shapes of the file's tensors by name."""
         widths = itertools.pairwise((self.observation_size, *self.hidden, 2 * self.action_size))
         layers = {f"actor.{k}": pair for k, pair in enumerate(widths)}
         weights = {f"{name}.weight": (fan_out, fan_in) for name, (fan_in, fan_out) in layers.items()}
@@ -106,7 +106,7 @@ def save_policy(path: Path, actor: Actor, info: PolicyInfo) -> None:
 
 
 def sealed(tensors: Mapping[str, Array], info: str) -> bytes:
-    """The contents of a policy file: tensors, and metadata with the checksum of all of it."""
+    """Return the contents of a policy file: tensors, and metadata with the checksum of the whole file."""
     content = save(dict(tensors), {"sha256": NO_DIGEST.decode(), "format": FORMAT, "info": info})
     return content.replace(NO_DIGEST, hashlib.sha256(content).hexdigest().encode(), 1)
 
@@ -174,7 +174,7 @@ def _content(path: Path) -> bytes:
 
 
 def _verified(path: Path, content: bytes) -> dict[str, Any]:
-    """The metadata, after making sure that their format is this one and that the checksum in them fits the file."""
+    """Return the metadata after a check of their format and of their checksum against the file."""
     size = int.from_bytes(content[:8], "little")
     if not size <= min(LARGEST_HEADER, len(content) - 8):
         raise InputError(f"{path}: damaged or not a policy file (a header of {size} bytes)")
@@ -219,7 +219,7 @@ def _require(path: Path, tensors: Mapping[str, Array], shapes: Mapping[str, Sequ
 
 
 def kept_policies(run: Path, last: int) -> list[Path]:
-    """The last policies that a run has kept, the oldest first.
+    """Return the `last` newest policies that a run has kept, the oldest first.
 
     Raises:
         InputError: there is no such folder, or it has fewer of them.
@@ -237,9 +237,9 @@ def kept_policies(run: Path, last: int) -> list[Path]:
 
 
 def averaged(files: Sequence[Path]) -> tuple[Actor, PolicyInfo]:
-    """An actor with the mean of the weights in policy files, described as the last of them.
+    """Return an actor with the mean weights of policy files, and the last file's metadata.
 
-    A policy that learns all the time sways about what is best; the mean over its way stands nearer to it. Source:
+    The weights of a policy in training fluctuate around an optimum; their mean over time is closer to it. Source:
     Izmailov et al., *Averaging Weights Leads to Wider Optima and Better Generalization*, UAI 2018.
 
     Raises:

@@ -113,7 +113,7 @@ def _checked(value: Any, place: str, label: str) -> Any:
 
 
 def _entry(key: str, value: Any, place: str, label: str) -> Any:
-    """A key's value, checked; of a file that the package ships, its path."""
+    """Return a key's value after a check; for a file that ships with the package, return its path."""
     if "${" in key or (key.startswith("_") and key not in ("_target_", "_convert_")):
         raise InputError(f"{label}: {place[:60]} is no setting of an environment")
     if key not in ("file", "urdf") or value is None:

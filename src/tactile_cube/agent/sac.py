@@ -19,7 +19,7 @@ CRITIC_KEYS = ["observation", "privileged", "action"]
 
 
 def stochastic_actor(actor: Actor, action_size: int) -> ProbabilisticActor:
-    """The actor as TorchRL's tanh-normal policy: reads "observation" only, writes "action"."""
+    """Return the actor as TorchRL's tanh-normal policy: it reads "observation" only and writes "action"."""
     return ProbabilisticActor(
         module=TensorDictModule(actor, in_keys=["observation"], out_keys=["loc", "scale"]),
         in_keys=["loc", "scale"],
@@ -57,7 +57,7 @@ class Sac(Agent):
             ) from error
 
     def build_loss(self, critics: list[Critic]) -> LossModule:
-        """TorchRL's loss with its targets."""
+        """Make TorchRL's loss with its targets."""
         weight = self.settings.demonstration_weight
         if weight:
             raise InputError(
@@ -88,10 +88,10 @@ class Sac(Agent):
         losses.select("loss_qvalue", "loss_actor", "loss_alpha", "alpha")
 
     def losses(self, batch: TensorDictBase) -> TensorDictBase:
-        """What TorchRL's loss gives, and the value of the actor's actions."""
+        """Return the output of TorchRL's loss, and the value of the actor's actions."""
         losses: TensorDictBase = self.loss(batch)
         return losses.set("value", (-losses["alpha"] * losses["entropy"] - losses["loss_actor"]).detach())
 
     def follow(self) -> None:
-        """By tau."""
+        """Let the target critics follow the critics by tau."""
         self._targets.step()

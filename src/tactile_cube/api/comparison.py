@@ -53,10 +53,10 @@ def run_recording(job: Job) -> dict[str, Recording]:
 
 
 def opened_or_imported(job: Job, recording: Recording | PathLike | None) -> Recording:
-    """The recording, or what a job's source of logs gives, which is written into its folder.
+    """Return the recording, or import the logs of a job's source into its folder and return the result.
 
     Raises:
-        InputError: neither of them, or both.
+        InputError: neither of them is given, or both are.
     """
     if (recording is None) == (job.config.get("source") is None):
         raise InputError(
@@ -181,7 +181,7 @@ def run_comparison(
 
 
 def _at_gain(model: ModelFile | None, gain: Any) -> ModelFile | None:
-    """The model with so many times the position gain; what else a servo has stays."""
+    """Return the model with its position gain times `gain`; the servo's other constants do not change."""
     if not (isinstance(gain, int | float) and 0.0 < gain < math.inf):
         raise InputError(f"gain={gain}: give the P gain over that at which the model was identified, a number above 0")
     if gain == 1.0:
@@ -196,7 +196,7 @@ def _at_gain(model: ModelFile | None, gain: Any) -> ModelFile | None:
 
 
 def opened(recording: Recording | PathLike) -> Recording:
-    """The recording, read if it is a folder's name; what is odd about it goes to stderr."""
+    """Return the recording, read if it is a folder's name; its warnings go to stderr."""
     if isinstance(recording, Recording):
         return recording
     read = read_recording(str(recording))  # on the command line 2026 is a number
@@ -206,5 +206,5 @@ def opened(recording: Recording | PathLike) -> Recording:
 
 
 def modelled(model: ModelFile | PathLike | None) -> ModelFile | None:
-    """The model, read if it is a file's name."""
+    """Return the model, read if it is a file's name."""
     return None if model is None else as_model(model)

@@ -27,7 +27,7 @@ from tactile_cube.simulation import constants_of
 
 @as_input_errors
 def load_policy(policy: PathLike | None = None) -> Network:
-    """A trained policy in numpy: call it with observations `(..., 120)` for actions `(..., 12)` in [-1, 1].
+    """Load a trained policy in numpy: call it with observations `(..., 120)` for actions `(..., 12)` in [-1, 1].
 
     Args:
         policy: a policy file, a training run's folder, or a policy that ships with the package; None: the shipped one.
@@ -224,9 +224,9 @@ def _control_loop(config: Any, network: Network, setting: TrainingSetting, limit
 
 
 def robot_limits(setting: TrainingSetting, rate: float) -> JointLimits:
-    """The limits of the interface contract, with the largest change [rad/s]; range, gains and torque of the training.
+    """Return the interface contract's limits: largest change `rate` [rad/s]; the training's range, gains and torque.
 
-    A policy that was trained with a softer hand gets no wider commands: the stiffness is at least the hand's.
+    The stiffness is at least the hand's, so a policy that was trained with a softer hand gets no wider commands.
     """
     hand, constants = setting.hand, setting.constants
     gains = (np.maximum(constants.kp, constants_of(hand).kp), np.asarray(constants.kd))

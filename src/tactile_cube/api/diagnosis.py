@@ -181,12 +181,12 @@ R = TypeVar("R")
 
 
 def each(work: Callable[[T], R], over: Sequence[T], jobs: int = 1) -> Iterator[tuple[T, R]]:
-    """What `work` makes of each, in the order in which it is done.
+    """Yield each item with the result of `work` for it, in the order in which they finish.
 
     Args:
-        work: runs in other processes, so it and what it takes and gives can be pickled.
-        over: what it is given, one each.
-        jobs: processes.
+        work: runs in other processes, so it, its argument and its result must be picklable.
+        over: the arguments of `work`, one per call.
+        jobs: number of processes.
 
     Raises:
         InputError: what `work` raises.

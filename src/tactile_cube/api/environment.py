@@ -35,9 +35,9 @@ def env_config(
     own_effects: Sequence[str] | None = None,
     values: Mapping[str, Any] | None = None,
 ) -> EnvConfig:
-    """The environment of the groups of conf/train.yaml, as plain data; keywords are those of `train`.
+    """Return the environment of the groups of conf/train.yaml as plain data; keywords are those of `train`.
 
-    Without an experiment it is the published task.
+    Without an experiment this is the published task.
 
     Raises:
         InputError: a value that cannot be used.
@@ -51,7 +51,7 @@ def env_config(
 
 
 def make_env(config: EnvConfig | None = None, *, worlds: int = 1, seed: int = 0) -> TransformedEnv:
-    """A TorchRL environment of the hand: worlds, joint offsets, noise, sticky actions, the observation stack.
+    """Make a TorchRL environment of the hand: worlds, joint offsets, noise, sticky actions, the observation stack.
 
     It is the task itself, as Gymnasium's `tactile_cube/Rotation-v0` and `evaluate` have it: full weight and T_s of the
     task. A curriculum and extra exploration belong to `train`; an easier stage is set, as in

@@ -41,7 +41,7 @@ class EvaluationResult:
         return "\n".join(one.text for one in self.variants)
 
     def episode(self, number: int, variant: int = 0) -> EpisodeRecord:
-        """Every signal of an episode; it runs once more, equal to the bit."""
+        """Run an episode again, equal to the bit, and return every signal of it."""
         chosen = self.variants[variant]
         return self.evaluation.record(chosen.variant, chosen.results[number])
 
@@ -216,7 +216,7 @@ def _write_run(job: Job, file: Path, say: Say) -> dict[str, EpisodeResult]:
 
 
 def learning_curve(folder: Path) -> Curve | None:
-    """The learning curve of a run's folder; None without metrics."""
+    """Return the learning curve of a run's folder; None without metrics."""
     metrics = folder / "metrics.csv"
     if not metrics.is_file() or metrics.read_text(encoding="utf-8").count("\n") < 2:  # no row yet
         return None

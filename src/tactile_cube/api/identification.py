@@ -222,7 +222,7 @@ def run_model_export(
 
 
 def _with_stated(model: ModelFile, recording: Recording) -> ModelFile:
-    """The model with what only the recording states of constants."""
+    """Return the model with the constants added that only the recording states."""
     rows = {
         key: {joint: Estimate.model_validate(float(value)) for joint, value in zip(recording.joints, row, strict=True)}
         for key, row in nominal_model(recording, model).constants.items()

@@ -53,12 +53,12 @@ class Job:
         return round(time.perf_counter() - self.began, 2)
 
     def say(self, line: str) -> None:
-        """A line of progress on stderr, with the time."""
+        """Print a line of progress to stderr, with the time."""
         print(f"[{time.perf_counter() - self.began:5.1f} s] {line}", file=sys.stderr, flush=True)
 
 
 def typed_job(config: DictConfig) -> Job:
-    """The job that a command line asks for.
+    """Return the job of the command line of this process.
 
     Raises:
         InputError: a class of effects that the configuration names cannot be imported.
@@ -70,16 +70,16 @@ def typed_job(config: DictConfig) -> Job:
 
 
 def called_job(command: str, given: Mapping[str, Any]) -> Job:
-    """The job that a call from a program asks for.
+    """Return the job of a call from a program.
 
     Args:
         command: its name.
         given: the call's keywords, which are the command's keys and groups; None: as conf/ says. Beside them `values`
-            (dotted key -> value), `folder`, where files go, and `say`. A recording goes by its folder, a model that is
-            no file by its rig.
+            (dotted key -> value), `folder`, where files go, and `say`. A recording is named by its folder, a model
+            without a file by its rig.
 
     Raises:
-        InputError: as `typed_job`, a key that the command does not have, or a setting in the place of a value.
+        InputError: as `typed_job`, a key that the command does not have, or a setting where a value is expected.
     """
     settings = settings_of(given)
     for key, value in settings.items():
@@ -95,7 +95,7 @@ def settings_of(given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def worded_job(command: str, words: Sequence[str], folder: PathLike | None = None) -> Job:
-    """The job of a command line's words; `folder`: where its files go, None: where the command would put them."""
+    """Return the job of a command line's words; `folder`: where its files go, None: the command's default folder."""
     from omegaconf import OmegaConf
 
     config = composed(command, with_recipe(command, [*words]), with_hydra=True)
@@ -108,7 +108,7 @@ def worded_job(command: str, words: Sequence[str], folder: PathLike | None = Non
 
 
 def as_word(key: str, value: Any) -> str:
-    """The word of a command line that sets a key to a value.
+    """Return the command-line override that sets a key to a value.
 
     Example:
         >>> as_word("effects", ["backlash@q2: play=0.05"])
@@ -168,7 +168,7 @@ def _job(config: DictConfig, hydra: Any, command: str, words: Sequence[str], fol
 
 
 def _effects(part: Any) -> Iterator[str]:
-    """What stands at the keys that name effects, anywhere in a tree."""
+    """Yield the values of the keys that name effects, anywhere in a tree."""
     for key, value in part.items() if isinstance(part, dict) else []:
         if key == "agent":  # its hidden layers are no effects
             continue
@@ -184,9 +184,9 @@ Result = TypeVar("Result")
 
 
 def as_input_errors(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
-    """The function with everything that the command line would tell in one line raised as an `InputError`.
+    """Wrap a function to raise as `InputError` every error that the command line reports in one line.
 
-    Hydra's own errors, those of pydantic and those wrapped in either say the same in many more lines.
+    Hydra's own errors, those of pydantic and those wrapped in either have many more lines.
     """
     keywords = inspect.signature(function).parameters
 

@@ -206,7 +206,7 @@ def _in_stages(job: Job, plain: dict[str, Any]) -> TrainingResult:
 
 
 def stages_of(job: Job) -> list[Job]:
-    """The stages that a job's configuration lists; what the user asked for holds in each of them.
+    """Return the stages that a job's configuration lists; the user's own overrides apply to each of them.
 
     Raises:
         InputError: a stage that cannot be composed.
@@ -292,10 +292,10 @@ def _write_joined_curve(files: Iterable[Path], output: Path) -> None:
 
 
 def plain_settings(job: Job) -> dict[str, Any]:
-    """The resolved configuration: with a model's contents in the place of its file, and the checksum of a URDF.
+    """Return the resolved configuration, with a model's contents instead of its file and the checksum of a URDF.
 
-    It says nothing of stages where there are none, nor of hand and object where they are the published ones: so runs
-    and policies from before one could choose them stay the same.
+    Stages are left out where there are none, hand and object where they are the published ones: runs and policies from
+    before these could be chosen stay the same.
     """
     plain: dict[str, Any] = OmegaConf.to_container(job.config, resolve=True)  # type: ignore[assignment]
     if not plain["stages"]:

@@ -91,11 +91,11 @@ class CommandGuard:
         self.command, self._sent, self.sent_at = command, now, self.clock()
 
     def _step(self, dt: float) -> float:
-        """How far a command may be from the one before [rad]."""
+        """Return the largest allowed change from the last command [rad]."""
         return self.limits.rate * min(dt, self.rules.lateness) if dt > 0 else 0.0
 
     def _before(self, q_m: Array) -> Array:
-        """The last command; at first the fingers stay where they are."""
+        """Return the last command; before the first one, `q_m` within the limits, where the fingers are."""
         return np.clip(q_m, self.limits.lower, self.limits.upper) if self.command is None else self.command
 
     def _doubt(self, now: float, stamp: float, reading: Reading) -> str:

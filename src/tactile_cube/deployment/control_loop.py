@@ -65,7 +65,7 @@ class Move:
         return self._start + self._share(now) * (self._goal - self._start)
 
     def arrived(self, now: float, q_m: Array) -> bool:
-        """Whether the fingers have rested at the goal for long enough."""
+        """Return whether the fingers have stayed at the goal for long enough."""
         if self._share(now) < 1.0 or self._away(q_m) > self._homing.tolerance:
             self._in_place = now
         return now - self._in_place >= self._homing.settle

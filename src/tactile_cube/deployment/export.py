@@ -150,7 +150,7 @@ def weights_hash(network: Network) -> str:
 
 
 def _test_vector(network: Network, hand: Hand) -> dict[str, Any]:
-    """An observation that leaves no place at zero, and the action that belongs to it."""
+    """Return an observation without zeros, and the action that belongs to it."""
     places = np.arange(network.observation_size)
     rest = np.resize([*hand.start_angles, *np.zeros(hand.joints)], network.observation_size)
     observation = (rest + 0.05 * np.sin(1.0 + places)).astype(np.float32)
@@ -162,7 +162,7 @@ def _plain(values: Any) -> list[float]:
 
 
 def _alike(values: Any) -> float | list[float]:
-    """One number where all joints have the same, else one each."""
+    """Return one number if it is the same for all joints, else one each."""
     numbers = _plain(values)
     return numbers[0] if len(set(numbers)) == 1 else numbers
 

@@ -302,7 +302,7 @@ class EnterKey:
             termios.tcflush(sys.stdin, termios.TCIFLUSH)
 
     def pressed(self) -> bool:
-        """Whether Enter has been pressed; never waits, not for the rest of a line either."""
+        """Return whether Enter has been pressed; never wait, not even for the rest of a line."""
         if not self.usable or not select.select([sys.stdin], [], [], 0.0)[0]:
             return False
         return b"\n" in os.read(sys.stdin.fileno(), 4096)

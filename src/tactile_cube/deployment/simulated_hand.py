@@ -88,7 +88,7 @@ class SimulatedHand:
         return Reading(self._ticks / self._rate, q_m, np.array(self._world.torque))
 
     def send(self, q_d: Array) -> None:
-        """The world's impedance controller takes these angles from the next physics step on."""
+        """Set the desired angles of the world's impedance controller from the next physics step on."""
         self._q_d, self._sent = np.array(q_d), self._ticks
 
     def wait_for_object(self) -> bool:

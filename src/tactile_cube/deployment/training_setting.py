@@ -38,7 +38,7 @@ class TrainingSetting:
 
     @classmethod
     def of(cls, hand: Hand, constants: EpisodeConstants | None = None, task: Task | None = None) -> TrainingSetting:
-        """The setting of a hand, by default around the nominal cube, in the air."""
+        """Return the setting of a hand, by default around the nominal cube, in the air."""
         known, task = constants or constants_of(hand), task or Task("full")
         angles = StartStates().of(hand, known).angles[0]
         weighs = task.apply(known, replace(task.conditions(), gravity_scale=1.0))

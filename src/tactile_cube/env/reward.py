@@ -119,11 +119,11 @@ def leaving(step: Step) -> float:
 
 @term(+1)
 def advance(step: Step) -> float:
-    """How far the fingertips went ahead of the object, against its rotation, in sum [rad]. Not in the paper.
+    """Return the fingertips' total motion ahead of the object, against its rotation [rad]. Not in the paper.
 
-    A finger that turns with the object adds nothing, one that goes back to grasp anew adds its way at once, long before
-    the turn that this makes possible. The sum over an episode is bounded by the fingers' reach unless the object turns:
-    going to and fro earns nothing.
+    A finger that turns with the object adds nothing; one that moves back to regrasp adds its motion at once, long
+    before the rotation that this makes possible. The fingers' reach bounds the sum over an episode unless the object
+    rotates: moving to and fro earns nothing.
     """
     way = np.remainder(step.azimuths - step.azimuths_before + np.pi, 2.0 * np.pi) - np.pi
     return float(len(way) * spin(step) - step.direction * way.sum())
@@ -149,13 +149,13 @@ def link_spin(step: Step) -> float:
 
 @term(+1)
 def tips(step: Step) -> float:
-    """Whether three or more fingertips touch the object at the end of the step."""
+    """Return 1 if three or more fingertips touch the object at the end of the step, else 0."""
     return float(int((step.forces[1] > TOUCH_FORCE).sum()) >= SUPPORTING_TIPS)
 
 
 @term(-1)
 def links(step: Step) -> float:
-    """Whether another link does."""
+    """Return 1 if a link other than a fingertip touches the object at the end of the step, else 0."""
     return float((step.forces[0] > TOUCH_FORCE).any())
 
 
@@ -210,7 +210,7 @@ class Reward:
         return tuple(self.weight)
 
     def measure(self, step: Step) -> NDArray[np.float64]:
-        """The terms of a step, before weighing, in the order of `terms`."""
+        """Return the terms of a step before weighting, in the order of `terms`."""
         return np.array([TERMS[name].measure(step) for name in self.weight])
 
     def weights(self, penalty_scale: float = 1.0) -> NDArray[np.float32]:

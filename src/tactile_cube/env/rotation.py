@@ -136,9 +136,9 @@ class RotationEnv:
         return self._moment
 
     def step(self, action: Array) -> TimeStep:
-        """One policy step of 0.1 s with desired joint angles `action` (joints,) in [-1, 1], scaled to the action range.
+        """Run a policy step of 0.1 s; desired joint angles: `action` (joints,) in [-1, 1], scaled to the action range.
 
-        Faulty physics ends the episode with the last sound state once more and no reward.
+        Faulty physics ends the episode: the step repeats the last sound state with no reward.
         """
         self.target = self._middle + self._half_range * action
         self.world.step(self.target)
@@ -161,7 +161,7 @@ class RotationEnv:
         return cube_pose(self.world.cube_position.tolist(), quaternion, previous_theta)
 
     def _azimuths(self) -> Array:
-        """Where the fingertips stand about the object (fingers,) [rad]."""
+        """Return the azimuths of the fingertips about the object (fingers,) [rad]."""
         places = tip_positions(self.hand, self.world.q) - self.world.cube_position
         places = places if self._frame is None else self._frame.inv().apply(places)
         return np.arctan2(places[:, 1], places[:, 0])

@@ -37,14 +37,14 @@ class CubePose(NamedTuple):
 
 
 def frame_along(axis: Sequence[float] | NDArray[np.float64]) -> Rotation | None:
-    """The frame whose z axis is a direction of the world (3,); None for the vertical, which the world's own has."""
+    """Return the frame whose z axis is a direction of the world (3,); None for the vertical, the world's own z axis."""
     if np.array_equal(axis, (0.0, 0.0, 1.0)):
         return None
     return Rotation.align_vectors([axis], [(0.0, 0.0, 1.0)])[0]
 
 
 def seen_along(frame: Rotation | None, quaternion: Sequence[float]) -> Sequence[float]:
-    """An orientation (4,) x, y, z, w of the world as it is told in `frame`: turning about its z axis changes theta."""
+    """Express an orientation (4,) x, y, z, w of the world in `frame`: rotation about its z axis changes theta."""
     if frame is None:
         return quaternion
     turned = frame.inv() * Rotation.from_quat(quaternion) * frame
@@ -84,7 +84,7 @@ class Conditions:
     penalty_scale: float
 
     def columns(self) -> dict[str, float]:
-        """By the names that they have in logs: "T_s" [s], "gravity" and "penalty" (scales)."""
+        """Return the conditions by their names in logs: "T_s" [s], "gravity" and "penalty" (scales)."""
         return {"T_s": self.filter_time, "gravity": self.gravity_scale, "penalty": self.penalty_scale}
 
 
@@ -145,7 +145,7 @@ class Task:
         self.axis_vector()  # refuses what is no direction
 
     def axis_vector(self) -> NDArray[np.float64]:
-        """The axis of the rotation as a unit vector (3,)."""
+        """Return the axis of the rotation as a unit vector (3,)."""
         named = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
         given = named.get(self.axis, ()) if isinstance(self.axis, str) else self.axis
         vector = np.asarray(given, dtype=np.float64)
@@ -155,11 +155,11 @@ class Task:
         return np.asarray(vector / length)
 
     def conditions(self) -> Conditions:
-        """The task's own conditions, which a curriculum ends at."""
+        """Return the task's own conditions, at which a curriculum ends."""
         return Conditions(self.filter_time, self.gravity_scale, penalty_scale=1.0)
 
     def apply(self, constants: EpisodeConstants, conditions: Conditions) -> EpisodeConstants:
-        """The constants of an episode of this task: T_s, weight, onset of gravity and table as the task wants them."""
+        """Return the constants of an episode: T_s and weight of `conditions`, gravity onset and table of this task."""
         return dataclasses.replace(
             constants,
             filter_time=conditions.filter_time,

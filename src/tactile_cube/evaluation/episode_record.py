@@ -92,7 +92,7 @@ class EpisodeRecord:
     axis: tuple[float, ...] = (0.0, 0.0, 1.0)
 
     def of_finger(self, finger: int) -> slice:
-        """Where a finger's joints stand in joint vectors."""
+        """Return the slice of a finger's joints in joint vectors."""
         count = self.joint_position.shape[1] // len(self.fingers)
         return slice(count * finger, count * (finger + 1))
 

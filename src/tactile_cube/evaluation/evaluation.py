@@ -108,7 +108,7 @@ class Evaluation:
             env.close()
 
     def _feeling(self, variant: Variant) -> Policy:
-        """The policy, without the senses that a variant takes away."""
+        """Return the policy, without the senses that a variant takes away."""
         return NumbPolicy(self._policy, variant.numb, self.hand) if variant.numb else self._policy
 
     def _run_variant(self, variant: Variant, report: Report) -> VariantResult:

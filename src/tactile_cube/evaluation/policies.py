@@ -233,7 +233,7 @@ def worlds(config: DictConfig, source: PolicySource, choices: Mapping[str, str |
 
 
 def _trained(config: DictConfig, source: PolicySource, choices: Mapping[str, str | None], named: bool) -> DictConfig:
-    """The environment of the training, with the hand and object asked for; what nobody trained has that of evaluate."""
+    """Return the training's environment with the chosen hand and object; for an untrained policy, that of evaluate."""
     if source.config.get("env") is None:
         return OmegaConf.create(OmegaConf.to_container(config.untrained, resolve=True))  # type: ignore[return-value]
     asked = {group for group in ("hand", "object") if group in config}
@@ -254,7 +254,7 @@ def _chosen(group: str, choices: Mapping[str, str | None]) -> bool:
 
 
 def _set_engine(settings: Any, wanted: str | None) -> None:
-    """One engine for the one world of an evaluation: the wanted one, else that of the training."""
+    """Set one engine for the one world of an evaluation: the wanted one, else that of the training."""
     trained = OmegaConf.select(settings, "simulation.engine")
     if wanted not in (None, "bullet", "mujoco"):
         raise InputError(f"engine={wanted}: choose bullet or mujoco")

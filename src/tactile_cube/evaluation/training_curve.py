@@ -117,10 +117,10 @@ def sweep_table(runs: Mapping[str, Mapping[int, Curve]], paper: Mapping[str, str
 
 
 def median_interval(values: Sequence[float]) -> tuple[float, float, float]:
-    """The median of some runs, and between which of them that of all runs lies with 95 % probability or more.
+    """Return the median of some runs, and an interval that holds that of all runs with 95 % probability or more.
 
-    Ranks of the sample alone: nothing is assumed of the distribution, and a run that never got there is infinite. Of
-    fewer than six runs all are needed; the probability is then 1 - 2^(1 - n), 75 % for three.
+    Only ranks count: nothing is assumed of the distribution, and a run that never got there is infinite. For fewer than
+    six runs the interval spans all of them; its probability is then 1 - 2^(1 - n), 75 % for three.
 
     Source: the sign test's interval; Conover, Practical Nonparametric Statistics, section 3.2.
     """

@@ -187,7 +187,7 @@ def touching(record: EpisodeRecord) -> NDArray[np.bool_]:
 
 
 def support(record: EpisodeRecord) -> dict[str, float]:
-    """What bears the cube at the ends of the policy steps; a touch is more than `TOUCH_FORCE` of a tip, or of links.
+    """Measure what supports the cube at the ends of policy steps; a touch exceeds `TOUCH_FORCE` on a tip, or on links.
 
     Returns:
         tip_support: share of the time in which `SUPPORTING_TIPS` fingertips or more touch it. link_contact: share of

@@ -47,7 +47,7 @@ _ACROSS = f'<origin xyz="0 0 0" rpy="{np.pi} {-np.pi / 2.0} 0"/>'
 def _finger(
     name: str, position: tuple[float, ...], rotation_vector: tuple[float, ...], face: tuple[float, ...]
 ) -> Finger:
-    """A finger with its base at a position [m] and rotation vector [rad]. Source: scene.
+    """Make a finger with its base at a position [m] and rotation vector [rad]. Source: scene.
 
     Its root is the frame of q1, which turns about z. Every further link's z axis points along the link and its joint
     turns about y; q4 follows q3.
@@ -100,7 +100,7 @@ _PALM = CollisionShape("box", _SLAB, np.array([*(0.5 * (_LOW + _HIGH))[:2], _LOW
 
 
 def _every_finger(*degrees: float) -> Array:
-    """The same (q1, q2, q3) for all fingers: [deg] -> (12,) [rad]."""
+    """Repeat the same (q1, q2, q3) for all fingers: [deg] -> (12,) [rad]."""
     return np.tile(np.radians(degrees), len(_FINGERS))
 
 
@@ -124,5 +124,5 @@ DLR_HAND2 = Hand(
 
 
 def published_hand() -> Hand:
-    """The same, for conf/hand."""
+    """Return the hand of the paper, for conf/hand."""
     return DLR_HAND2

@@ -25,7 +25,7 @@ SEARCH_KEYS = ("name", "steps", "cpu_hours", "wall_hours", "commit")
 
 
 def places(hand: Hand) -> Array:
-    """Where the fingers of a hand stand around the object (fingers,) [rad]."""
+    """Return the azimuths of the fingers of a hand around the object (fingers,) [rad]."""
     return np.array([np.arctan2(finger.face[1], finger.face[0]) for finger in hand.fingers])
 
 
@@ -69,7 +69,7 @@ class Gait:
             )
 
     def of(self, hand: Hand) -> Gait:
-        """The same walk for a hand: where it has other fingers than there are phases, they go back in turn."""
+        """Return this gait for a hand; if its fingers and the phases differ in number, they move back in turn."""
         fingers = len(hand.fingers)
         if fingers == len(self.phases):
             return self

@@ -144,11 +144,11 @@ class Hand:
         return tuple((link, leader) for link, leader in leaders if leader != link)
 
     def chain_joints(self, finger: int) -> tuple[str, ...]:
-        """Names of all joints of a finger, coupled ones included, as in `urdf`."""
+        """Return the names of all joints of a finger, coupled ones included, as in `urdf`."""
         return tuple(self.fingers[finger].prefix + name for name in self.fingers[finger].joints)
 
     def followed(self, joint: str) -> str:
-        """The actuated joint that a joint of `urdf` moves with: itself, or the one that it follows."""
+        """Return the actuated joint that a joint of `urdf` moves with: itself, or the one that it follows."""
         for k in range(len(self.fingers)):
             names = self.chain_joints(k)
             if joint in names:
@@ -156,16 +156,16 @@ class Hand:
         return joint
 
     def of_finger(self, finger: int) -> slice:
-        """Where a finger's joints stand in joint vectors."""
+        """Return the slice of a finger's joints in joint vectors."""
         return slice(self.joints_per_finger * finger, self.joints_per_finger * (finger + 1))
 
     def all_angles(self, actuated: Array | float) -> Array:
-        """Values of all joints (fingers, links) from those of the actuated ones (joints,)."""
+        """Return the values of all joints (fingers, links) from those of the actuated ones (joints,)."""
         values = np.broadcast_to(np.asarray(actuated, dtype=np.float64), (self.joints,))
         return values.reshape(len(self.fingers), -1)[:, self.columns]
 
     def actuated(self, values: Array) -> Array:
-        """Values of the actuated joints (joints,) from those of all (fingers, links)."""
+        """Return the values of the actuated joints (joints,) from those of all (fingers, links)."""
         return np.asarray(values[:, self._own].ravel())
 
     def action_of(self, angles: Array) -> Array:
@@ -206,7 +206,7 @@ class Hand:
         return np.concatenate([self.finger_angles(k, tips[:, k]) for k in range(len(self.fingers))], axis=1)
 
     def urdf(self) -> str:
-        """The whole hand; its root link is `palm`, its joints are `joint_names` and the coupled ones."""
+        """Return the URDF of the whole hand: root link `palm`, joints `joint_names` and the coupled ones."""
         colour = f'<material name="palm"><color rgba="{_COLOURS["palm"]}"/></material>'
         parts = [f'<link name="palm">{"".join(visual_elements(shape, colour) for shape in self.palm)}</link>']
         for finger in self.fingers:
@@ -215,7 +215,7 @@ class Hand:
         return robot_element(self.name, parts)
 
     def finger_urdf(self, finger: int) -> str:
-        """A finger as a robot of its own, rooted in the frame of its first joint; names are without its prefix."""
+        """Return a finger's own URDF, rooted in the frame of its first joint; names are without its prefix."""
         return robot_element("finger", [_BASE, *self._finger_parts(self.fingers[finger], "", "base", "")])
 
     @property

@@ -57,7 +57,7 @@ def grasp_angles(
 
 
 def _misses(hand: Hand, finger: int, targets: Array) -> Array:
-    """How far a fingertip stays from targets (n, 3) within the limits (n,) [m]."""
+    """Return the distance of a fingertip from targets (n, 3) within the joint limits (n,) [m]."""
     tips = hand.finger_tips(finger, _within_limits(hand, finger, targets))
     return np.asarray(np.linalg.norm(tips - targets, axis=1))
 

@@ -141,7 +141,7 @@ class Mjcf:
 
 
 def is_mjcf(text: str) -> bool:
-    """Whether a text may be MJCF: its first element is <mujoco>."""
+    """Return whether a text may be MJCF: its first element is <mujoco>."""
     start = text.find("<mujoco")
     return start >= 0 and "<robot" not in text[:start]
 
@@ -210,12 +210,12 @@ class _Reader:
         return [*parts, *map(_link, links[:-1]), _link(name, mass)]
 
     def _shift(self, body: int) -> Array:
-        """Where the link of a body has its origin: at its last joint, in the body's frame."""
+        """Return the origin of a body's link in the body's frame: its last joint."""
         count = self.model.body_jntnum[body]
         return self._place(self.model.body_jntadr[body] + count - 1) if count else np.zeros(3)
 
     def _place(self, joint: int) -> Array:
-        """Of a joint in its body's frame (3,) [m]; a free joint has none."""
+        """Return the position of a joint in its body's frame (3,) [m]; zero for a free joint."""
         return np.zeros(3) if self._kind(joint) == "FREE" else np.asarray(self.model.jnt_pos[joint])
 
     def _joint(self, joint: int, parent: str, child: str, place: Array, turn: Array, mimics: dict[int, str]) -> str:
@@ -304,5 +304,5 @@ def _joint_element(name: str, kind: str, parent: str, child: str, inside: str) -
 
 
 def _matrix(quaternion: Array) -> Array:
-    """Of a quaternion in MuJoCo's order, w first."""
+    """Return the rotation matrix of a quaternion in MuJoCo's order, w first."""
     return np.asarray(Rotation.from_quat(quaternion, scalar_first=True).as_matrix())

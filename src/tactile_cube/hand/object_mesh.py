@@ -64,12 +64,12 @@ class ObjectMesh:
         return hash(self.vertices.tobytes())
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """Everything as arrays, for a file."""
+        """Return all attributes as arrays, for a file."""
         return {name: np.asarray(value) for name, value in vars(self).items()}
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> ObjectMesh:
-        """What `arrays` gave."""
+        """Make a mesh from the output of `arrays`."""
         vertices, faces, com, moments = (arrays[name] for name in ("vertices", "faces", "com", "moments"))
         return cls(vertices, faces, float(arrays["volume"]), com, moments, str(arrays["file"]))
 
@@ -79,9 +79,9 @@ class ObjectMesh:
         return np.asarray(np.trace(moments) * np.eye(3) - moments)
 
     def surface(self, size: Array, origins: Array, directions: Array) -> tuple[Array, Array]:
-        """Where rays from `origins` (n, 3) along unit vectors `directions` (n, 3) leave the solid of `size` (3,) [m].
+        """Find where rays from `origins` along unit vectors `directions` (n, 3) leave the solid of `size` (3,) [m].
 
-        Gives points (k, 3) [m] and outward normals (k, 3) of the k <= n rays that begin inside.
+        Return points (k, 3) [m] and outward normals (k, 3) of the k <= n rays that begin inside.
         """
         planes = ConvexHull(self.vertices * size).equations  # normal @ x + offset <= 0 inside
         depth = -(origins @ planes[:, :3].T + planes[:, 3])

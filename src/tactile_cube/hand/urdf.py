@@ -36,7 +36,7 @@ class CollisionShape:
 
 
 def with_inertias(urdf: str, links: Sequence[str], mass: Array, com: Array, inertia: Array) -> str:
-    """The same robot with other masses (n,) [kg] of some links.
+    """Return the same robot with other masses (n,) [kg] of some links.
 
     Centres of mass (n, 3) [m] and inertias about them (n, 3, 3) [kg m^2] are in the links' frames.
     """
@@ -52,7 +52,7 @@ def with_inertias(urdf: str, links: Sequence[str], mass: Array, com: Array, iner
 
 
 def robot_element(name: str, parts: Iterable[str]) -> str:
-    """A whole description from its links and joints."""
+    """Return a whole robot description from its links and joints."""
     return "\n".join(['<?xml version="1.0"?>', f'<robot name="{name}">', *parts, "</robot>", ""])
 
 
@@ -81,17 +81,17 @@ def roll_pitch_yaw(rotation: Array) -> Array:
 
 
 def number_list(values: Array) -> str:
-    """Numbers with spaces between them."""
+    """Return numbers as text with spaces between them."""
     return " ".join(f"{value:.12g}" for value in values)
 
 
 def collision_element(shape: CollisionShape) -> str:
-    """A shape as URDF's <collision>."""
+    """Return a shape as URDF's <collision>."""
     return f"<collision>{origin_element(shape.position, shape.rotation)}{_geometry(shape)}</collision>"
 
 
 def visual_elements(shape: CollisionShape, material: str) -> str:
-    """A shape as <visual> elements that every reader can draw: a capsule as a cylinder and two spheres."""
+    """Return a shape as <visual> elements that every reader can draw: a capsule as a cylinder and two spheres."""
     if shape.kind != "capsule":
         return f"<visual>{origin_element(shape.position, shape.rotation)}{_geometry(shape)}{material}</visual>"
     radius, length = shape.size

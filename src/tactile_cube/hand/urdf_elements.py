@@ -36,7 +36,7 @@ class Placement:
     translation: Array = field(default_factory=lambda: np.zeros(3))
 
     def then(self, inner: Placement) -> Placement:
-        """The frame `inner` of this frame, seen from outside."""
+        """Return `inner`, a frame given in this frame, as seen from outside this frame."""
         return Placement(self.rotation @ inner.rotation, self.rotation @ inner.translation + self.translation)
 
 
@@ -49,7 +49,7 @@ class Body:
     inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
 
     def seen_from(self, place: Placement) -> Body:
-        """The same body in the frame in which its own frame sits at `place`."""
+        """Return the same body in the frame in which its own frame is at `place`."""
         R = place.rotation
         return Body(self.mass, R @ self.com + place.translation, R @ self.inertia @ R.T)
 
@@ -101,7 +101,7 @@ class Joint:
 
 
 def joint_of(element: ElementTree.Element, bodies: Mapping[str, Body]) -> Joint:
-    """A <joint> with the body of the link that it carries, of `bodies` by link."""
+    """Read a <joint>, with the body of the link that it carries from `bodies` by link."""
     name = attribute(element, "name", "a joint")
     kind = attribute(element, "type", f"joint '{name}'")
     if kind not in (*MOVABLE, *FREE, "fixed"):
@@ -130,19 +130,19 @@ def joint_of(element: ElementTree.Element, bodies: Mapping[str, Body]) -> Joint:
 
 
 def _end(limit: ElementTree.Element | None, key: str, joint: str) -> float:
-    """A limit; exporters write 1e16 or inf where they know none."""
+    """Read a limit; exporters write 1e16 or inf where they know none."""
     value = number(limit, key, f"the limit of joint '{joint}'", 0.0, most=np.inf)
     return value if abs(value) <= limits.NUMBER else float(np.copysign(np.inf, value))
 
 
 def _strength(limit: ElementTree.Element | None, key: str, joint: str) -> float:
-    """A limit of speed or torque; exporters also write 0 or -1 where they know none."""
+    """Read a limit of speed or torque; exporters also write 0 or -1 where they know none."""
     value = _end(limit, key, joint)
     return value if value > 0.0 else float("inf")
 
 
 def body_of(link: ElementTree.Element) -> Body:
-    """The <inertial> of a <link>; without one it has no mass. Raises InputError: no body has this mass."""
+    """Read the <inertial> of a <link>; without one it has no mass. Raises InputError: no body has this mass."""
     inertial, where = link.find("inertial"), f"link '{link.get('name')}'"
     if inertial is None:
         return Body()
@@ -158,7 +158,7 @@ def body_of(link: ElementTree.Element) -> Body:
 
 
 def balanced(body: Body, link: str) -> Body:
-    """The body itself, or with the mean of its moments where no body has them, as MuJoCo's balanceinertia does.
+    """Return the body, with its mean moment where its moments are impossible, as MuJoCo's balanceinertia does.
 
     Raises:
         InputError: the mean is no moment of inertia either.
@@ -182,7 +182,7 @@ def principal_moments(body: Body) -> Array:
 
 
 def placement_of(element: ElementTree.Element, where: str) -> Placement:
-    """The <origin> of an element."""
+    """Read the <origin> of an element."""
     origin = element.find("origin")
     if origin is None:
         return Placement()
@@ -226,7 +226,7 @@ def triple(element: ElementTree.Element, key: str, where: str) -> Array:
 def number(
     element: ElementTree.Element | None, key: str, where: str, default: float, most: float = limits.NUMBER
 ) -> float:
-    """One number of an attribute, of size `most` or less."""
+    """Read one number of an attribute, of size `most` or less."""
     text = element.get(key) if element is not None else None
     try:
         value = default if text is None else float(text)
@@ -238,7 +238,7 @@ def number(
 
 
 def attribute(element: ElementTree.Element, key: str, where: str) -> str:
-    """An attribute that must be there."""
+    """Read an attribute that must be there."""
     value = element.get(key)
     if not value:
         raise InputError(f"URDF: {where} lacks the attribute '{key}'; add it")

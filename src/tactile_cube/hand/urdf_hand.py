@@ -63,9 +63,9 @@ def _shape(element: ElementTree.Element, at: Placement, where: str) -> Collision
 
 
 def _finger(name: str, one: Mapping[str, Any], text: str) -> tuple[Finger, tuple[int, ...]]:
-    """A described finger, cut out of a URDF, and the actuated joint that each of its joints moves with.
+    """Cut a described finger out of a URDF; return it and the actuated joint that each of its joints moves with.
 
-    Products of inertia about a joint's axis are left out: beside the rotor's inertia, which acts there, they vanish.
+    Products of inertia about a joint's axis are left out: they are negligible beside the rotor's inertia about it.
     """
     where = f"hand.fingers.{name}"
     for key in ("joints", "tip", "side"):

@@ -34,7 +34,7 @@ Homes = dict[str, tuple[str, Placement]]
 def read_movable_joints(
     text: str, joints: Sequence[str] | None = None, coupled: Mapping[str, Mimic] | None = None
 ) -> tuple[list[Joint], Homes, tuple[str, ...], tuple[str, ...]]:
-    """The joints that move, parents first; where all links are; the actuated joints in order; what was corrected.
+    """Return the moving joints, parents first; the places of all links; the actuated joints in order; corrections.
 
     See `RigidBodyTree.from_urdf` for the arguments.
     """
@@ -67,10 +67,10 @@ def read_movable_joints(
 
 
 def read_joints(text: str) -> tuple[list[Joint], dict[str, Body]]:
-    """All joints of a URDF, fixed ones too, and the bodies by link.
+    """Read all joints of a URDF, fixed ones too, and the bodies by link.
 
     Raises:
-        InputError: it is no URDF, names a thing twice, or has a number that no mechanism has.
+        InputError: it is no URDF, uses a name twice, or has a number that no mechanism has.
     """
     robot = robot_of(text)
     links, joints = robot.findall("link"), robot.findall("joint")
@@ -86,7 +86,7 @@ def read_joints(text: str) -> tuple[list[Joint], dict[str, Body]]:
 
 
 def robot_of(text: str) -> ElementTree.Element:
-    """The root element of a URDF. Raises InputError: it is no URDF."""
+    """Return the root element of a URDF. Raises InputError: it is no URDF."""
     try:
         robot = ElementTree.fromstring(text.lstrip("\ufeff \r\n\t"))
     except (ElementTree.ParseError, ValueError, LookupError) as error:  # an encoding that is none
@@ -104,7 +104,7 @@ def robot_of(text: str) -> ElementTree.Element:
 
 
 def _parents_first(every: list[Joint], bodies: Mapping[str, Body]) -> tuple[str, list[Joint]]:
-    """The root link, and the joints branch after branch to its end, which is PyBullet's order too."""
+    """Return the root link, and the joints in depth-first order, which is PyBullet's order too."""
     children = [j.link for j in every]
     for name in children:
         if children.count(name) > 1:
@@ -221,7 +221,7 @@ def _require_parts(file: Path) -> list[Path]:
 
 
 def _make_absolute(element: ElementTree.Element, folder: Path, root: Path, where: str) -> None:
-    """Of a shape all files that it names; of another element that which it names itself."""
+    """Make file names absolute: of a shape all that it contains, of another element only its own."""
     for part in element.iter() if _local(element.tag) in SHAPES else (element,):
         if _local(part.tag) == "filename":  # as some readers have it
             raise InputError(f"{where}: <filename> is an attribute; write filename=")

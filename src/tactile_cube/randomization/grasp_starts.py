@@ -45,7 +45,7 @@ class StartStates:
             raise InputError(f"start.yaw_range is {self.yaw_range} rad; give 0 to below pi/4, beyond it faces repeat")
 
     def of(self, hand: Hand, constants: EpisodeConstants | None = None) -> StartPoses:
-        """The start poses of `hand` with the object of `constants`; None: the nominal cube."""
+        """Return the start poses of `hand` with the object of `constants`; None: the nominal cube."""
         known = constants or EpisodeConstants()
         nominal = known.object_shape == "box" and np.array_equal(known.cube_size, EpisodeConstants().cube_size)
         if self.poses == 1 and nominal:
@@ -169,7 +169,7 @@ class GraspStarts:
             raise InputError(f"start.share is {self.share}; give a part above 0, at most 1")
 
     def of(self, hand: Hand, constants: EpisodeConstants | None = None) -> GraspTable:
-        """The starts of `hand` with the object of `constants`; None: the nominal cube.
+        """Return the starts of `hand` with the object of `constants`; None: the nominal cube.
 
         Raises:
             InputError: the grasps are of another hand or another object.

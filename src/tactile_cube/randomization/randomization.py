@@ -27,7 +27,7 @@ class Distribution(Protocol):
     """A random quantity, given by its quantile function."""
 
     def quantile(self, u: Array) -> Array:
-        """The values below which the fractions `u` in [0, 1) of all draws lie, same shape as `u`."""
+        """Return the values below which the fractions `u` in [0, 1) of all draws lie, same shape as `u`."""
 
 
 def sample(distribution: Distribution, rng: np.random.Generator, shape: tuple[int, ...] = ()) -> Array:
@@ -90,7 +90,7 @@ class Choice:
             raise InputError("Choice: values is empty; give at least one number")
 
     def quantile(self, u: Array) -> Array:
-        """The value in whose equal share of [0, 1) each number of `u` lies."""
+        """Return the value in whose equal share of [0, 1) each number of `u` lies."""
         values = np.asarray(self.values, dtype=np.float64)
         return np.asarray(values[(np.asarray(u) * len(values)).astype(np.int64)])
 
@@ -123,7 +123,7 @@ class EffectRange:
     parameters: Mapping[str, Distribution]
 
     def draw(self, rng: np.random.Generator) -> Effect:
-        """The effect of one episode."""
+        """Draw the effect of one episode."""
         return self.effect(self.joint, **{key: float(sample(one, rng)) for key, one in self.parameters.items()})
 
 
@@ -164,7 +164,7 @@ class Learnability:
 
 
 def drawn_places(odds: Array, rng: np.random.Generator) -> Array:
-    """Where in its range each constant lies `(constants,)` in [0, 1), for the probabilities `odds` of its parts."""
+    """Draw each constant's place in its range `(constants,)` in [0, 1), with the probabilities `odds` of its parts."""
     parts = [int(rng.choice(PARTS, p=row)) for row in odds]
     return np.asarray((np.array(parts) + rng.random(len(odds))) / PARTS)
 
@@ -225,7 +225,7 @@ class Randomization:
                 raise InputError(f"randomization.{key} is {getattr(self, key)}; give a number in [0, {end:g})")
 
     def learnability(self, nominal: EpisodeConstants) -> Learnability:
-        """What is known of the `values` of one number each before the first episode; of none unless `steered`."""
+        """Return the initial `Learnability` of the `values` of one number each; of none unless `steered`."""
         single = {k: d for k, d in self.values.items() if k in DRAWN_ONCE or not np.shape(getattr(nominal, k))}
         return Learnability(single if self.steered else {}, self.steered)
 
@@ -265,9 +265,9 @@ PER_JOINT = ("kp", "kd", "stiffness", "static_friction", "reflected_inertia", "f
 def identified(
     model: ModelFile, constants: EpisodeConstants, randomization: Randomization, joints: Sequence[str]
 ) -> tuple[EpisodeConstants, Randomization, list[Effect]]:
-    """The hand that was identified: values in place of nominal ones, intervals in place of ranges, effects added.
+    """Return the identified hand: fitted values as nominal ones, intervals as ranges, effects added.
 
-    A model of one finger (q1, q2, q3) stands for all four. Constants that were fitted are drawn from their intervals;
+    A model of one finger (q1, q2, q3) applies to all four. Constants that were fitted are drawn from their intervals;
     those that were not keep the relative range of `randomization` around the model's value. `joints` are the hand's, in
     the order of the constants' vectors.
 
@@ -346,7 +346,7 @@ def _on_joints(estimates: Mapping[str, Estimate], nominal: Array, joints: Sequen
 
 
 def _offsets(model: ModelFile, default: Distribution, joints: Sequence[str]) -> Distribution:
-    """The span of the offsets over the robot's initialisations; `default` for joints whose recording shows none."""
+    """Return the span of the offsets over the robot's initialisations; `default` where a joint shows none."""
     low, _, high = _on_joints(model.offsets, np.zeros(len(joints)), joints)
     seen = high - low > UNSEEN
     if not seen.any():

@@ -36,10 +36,10 @@ _NO_DAMPING = {"linearDamping": 0.0, "angularDamping": 0.0, "jointDamping": 0.0}
 
 
 def connect(options: SimulationOptions) -> int:
-    """A physics server of its own in this process; gives the id of its client.
+    """Start a physics server of its own in this process and return the id of its client.
 
-    Its broadphase compares every two boxes at every step. Bullet's usual one, a tree, pays only with more bodies: for a
-    hand it takes 8 % longer, with the same contacts.
+    Its broadphase compares all pairs of boxes at every step. Bullet's default, a tree, is faster only with more bodies:
+    for a hand it takes 8 % longer, with the same contacts.
     """
     client = int(pybullet.connect(pybullet.DIRECT))
     pybullet.resetSimulation(pybullet.RESET_USE_SIMPLE_BROADPHASE, physicsClientId=client)
@@ -205,10 +205,10 @@ class BulletEngine:
         )
 
     def _set_cube(self, constants: EpisodeConstants, start: Start) -> None:
-        """A new body each time: Bullet keeps the inertia in the world of a used one for a step after it is moved.
+        """Make a new body each time: Bullet keeps the world inertia of a used one for a step after it is moved.
 
         It is a plain rigid body; as a multibody without links it would make the solver 8 % slower. Its origin is its
-        centre of mass. The skin of the fingertips is written on the cube, since Bullet cannot take it away again.
+        centre of mass. The skin of the fingertips is set on the cube, since Bullet cannot remove it again.
         """
         arm = com_arm(constants, np.asarray(start.cube_quaternion))
         self.cube = int(
@@ -248,9 +248,9 @@ class BulletEngine:
         pybullet.resetBaseVelocity(self.cube, linear.tolist(), turning.tolist(), **self._here)
 
     def _shape_of(self, constants: EpisodeConstants) -> int:
-        """The shape of the last object if it had this kind, size and centre of mass, else a new one.
+        """Return the last object's shape if kind, size and centre of mass are the same, else a new one.
 
-        Only one off its centre of mass pays for a compound shape around it.
+        Only an object with its centre of mass off the middle needs a compound shape around it.
         """
         kind, size, com = constants.object_shape, np.asarray(constants.cube_size), np.asarray(constants.cube_com)
         same = kind == self._cube_kind and np.array_equal(size, self._cube_size)

@@ -201,7 +201,7 @@ _MESH_KEYS = ("shape", "file", "scale", "mass", "density", "hull")
 
 
 def _without_mesh(given: dict[str, Any]) -> dict[str, Any]:
-    """An object's settings with the mesh that they name read: its shape, size, mass and centre of mass."""
+    """Replace the mesh that an object's settings name by its shape, size, mass and centre of mass."""
     if given.get("shape") != "mesh":
         return given
     for key in given.keys() - set(_MESH_KEYS):
@@ -218,7 +218,7 @@ def _without_mesh(given: dict[str, Any]) -> dict[str, Any]:
 
 
 def _vector(name: str, value: object, length: int) -> Array:
-    """A read-only vector of the given length, from one number or as many as needed."""
+    """Return a read-only vector of the given length, from one number or as many as needed."""
     array = np.asarray(value, dtype=np.float64)
     if array.shape not in ((), (length,)):
         raise InputError(f"{name} has shape {array.shape}; give one number or {length}")

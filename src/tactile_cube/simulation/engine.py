@@ -52,7 +52,7 @@ def named_contact(
     force: float,
     friction: Array,
 ) -> Contact:
-    """A contact told from the side of the finger; of the table where no finger takes part.
+    """Return a contact from the side of the finger, or of the table where no finger takes part.
 
     `first` and `second` name a body (finger, `cube` or `table`) and its link, "" where there is none; `middle` (3,) [m]
     lies between the two surfaces, `normal` and `friction` point into and act on the second.
@@ -89,7 +89,7 @@ class Surface:
 
 
 def surfaces(constants: EpisodeConstants) -> dict[str, Surface]:
-    """The surfaces of an episode: `tip`, `link` (all other links), `cube` and `table`."""
+    """Return the surfaces of an episode: `tip`, `link` (all other links), `cube` and `table`."""
     return {
         "tip": Surface(constants.tip_friction, constants.tip_spinning_friction, constants.tip_compliance),
         "link": Surface(constants.link_friction),
@@ -263,7 +263,7 @@ class HandDrive:
         return self.plant.view(self.memory, key)
 
     def signal(self, row: int) -> Array:
-        """A signal of the last physics step (joints,)."""
+        """Return a signal of the last physics step (joints,)."""
         return self.plant.signal(self.memory, row)
 
     def set_engine_gravity(self, acceleration: Array) -> None:
@@ -288,7 +288,7 @@ class HandDrive:
             check_damping_stability(tree, replace(c, static_friction=0.0, **weakest), self.plant.dt)
 
     def _in_bases(self, vector: Array) -> Array:
-        """A world vector in the frame of each finger's base (fingers, 3)."""
+        """Rotate a world vector into the frame of each finger's base (fingers, 3)."""
         rotations = [self._hand.base_in_world(k)[1] for k in range(len(self._hand.fingers))]
         return np.stack([rotation.T @ vector for rotation in rotations])
 

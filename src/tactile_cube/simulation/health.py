@@ -24,7 +24,7 @@ BOUNDS = (
 
 
 def find_fault(q: Array, v: Array, cube: Array, distances: Sequence[float], coupled: NDArray[np.int64]) -> str:
-    """What is wrong with a state, in a few words; "" if nothing.
+    """Describe the fault of a state in a few words; "" if it has none.
 
     Angles and velocities of all joints are (fingers, links), the cube's state (13,), `distances` the gaps of contact
     points [m], `coupled` (pairs, 2) links that follow another one of their finger, and which.
@@ -64,9 +64,9 @@ REFERENCE_STEP, REFERENCE_ITERATIONS = 2e-4, 300
 
 
 def unresolved(spinning_friction: float, options: SimulationOptions) -> str:
-    """What to know about worlds whose answers are those of an unconverged solver, by the tips' spinning friction [m].
+    """Return a warning about worlds whose solver does not converge, by the tips' spinning friction [m].
 
-    "" where there is nothing: MuJoCo's solver runs until it has converged.
+    "" if there is none: MuJoCo's solver runs until it has converged.
     """
     reference = options.dt <= REFERENCE_STEP and options.solver_iterations >= REFERENCE_ITERATIONS
     if options.engine == "mujoco" or spinning_friction <= RESOLVED or reference:
@@ -78,6 +78,6 @@ def unresolved(spinning_friction: float, options: SimulationOptions) -> str:
 
 
 def unresolved_among(spinning_frictions: Sequence[float], options: SimulationOptions) -> str:
-    """The same about worlds that were drawn, with the number of those it concerns; "" where it concerns none."""
+    """Return the same warning about worlds that were drawn, with the number of those affected; "" if none."""
     beyond = [friction for friction in spinning_frictions if unresolved(friction, options)]
     return f"{len(beyond)} of {len(spinning_frictions)} worlds: {unresolved(max(beyond), options)}" if beyond else ""

@@ -61,7 +61,7 @@ class HandSpec:
         self._mesh: Any = None
 
     def compile(self, constants: EpisodeConstants) -> Any:
-        """The model of an episode."""
+        """Compile the model of an episode."""
         self._set_links()
         self._set_objects(constants)
         known = surfaces(constants)
@@ -110,7 +110,7 @@ class HandSpec:
         return parts
 
     def _add_shape(self, body: Any, name: str, shape: CollisionShape) -> None:
-        """A link's collision shape; capsules and cylinders have half their length in MuJoCo."""
+        """Add a link's collision geom; capsules and cylinders have half their length in MuJoCo."""
         kinds, size = mujoco.mjtGeom, shape.size
         kind, numbers = {
             "capsule": (kinds.mjGEOM_CAPSULE, [size[0], 0.5 * size[-1], 0.0]),
@@ -278,12 +278,12 @@ class MujocoEngine:
         """Nothing to end: MuJoCo has no server."""
 
     def _names(self, shape: int) -> tuple[str, str]:
-        """The body (finger, `cube` or `table`) and link of a shape."""
+        """Return the body (finger, `cube` or `table`) and link of a geom."""
         body, _, link = self._model.geom(shape).name.partition("#")[0].partition(" ")
         return body, link
 
     def _touching(self, shape: int) -> tuple[int, int] | None:
-        """Of a finger's shape: 1 for the tip's and 0 for another link's, and which finger; else None."""
+        """Return for a finger's geom 1 if it is the tip's, else 0, and the finger; None for another geom."""
         body, link = self._names(shape)
         found = [k for k, finger in enumerate(self._hand.fingers) if finger.name == body]
         return (int(link == self._hand.fingers[found[0]].links[-1]), found[0]) if found else None

@@ -75,7 +75,7 @@ class World:
         self._cube = self._engine.cube_state()
 
     def step(self, q_n: Array) -> None:
-        """One policy step: `options.substeps` physics steps with the desired joint angles q_n (joints,) [rad]."""
+        """Run one policy step: `options.substeps` physics steps with the desired joint angles q_n (joints,) [rad]."""
         if self.steps == self.constants.gravity_onset:
             self.set_weight(self.constants.gravity_scale)
         self._drive.view("goal")[:] = q_n - self.constants.joint_offset
@@ -199,7 +199,7 @@ class World:
     # --- parts of reset and step ---------------------------------------------------------------------------------
 
     def _read_trace(self, filtered: Array, states: Array) -> dict[str, Array]:
-        """The trace of the step just run: q_f before it (joints,) [rad], the cube's states (substeps + 1, 13)."""
+        """Return the last step's trace: q_f before it (joints,) [rad], the cube's states (substeps + 1, 13)."""
         rows, dt, offset = self._drive.view("trace"), self.options.dt, np.asarray(self.constants.joint_offset)
         trace: dict[str, Array] = {
             name: rows[:, :, row, :].reshape(len(rows), -1).copy() for name, row in _JOINT_SIGNALS.items()

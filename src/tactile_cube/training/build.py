@@ -68,7 +68,7 @@ class Environment:
 
 
 def rotation_environment(config: EnvConfig) -> Environment:
-    """The rotation task as configured."""
+    """Make the environment of the rotation task as configured."""
     joints = config.hand.joints
     return Environment(
         make=partial(make_env, config),
@@ -83,7 +83,7 @@ def rotation_environment(config: EnvConfig) -> Environment:
 
 
 def as_environment(made: Any) -> Environment:
-    """What `env` in the configuration stands for: an environment, or the rotation task's configuration."""
+    """Return `env` of the configuration if it is an environment, else the rotation task made from it."""
     return made if isinstance(made, Environment) else rotation_environment(made)
 
 
@@ -98,7 +98,7 @@ def build_run(
     logger: Mapping[str, Any] | None = None,
     make_replay: Callable[..., ReplayBuffer] = TensorDictReplayBuffer,
 ) -> Run:
-    """A run in `folder`: gone on with where its checkpoint says, or new.
+    """Build a run in `folder`: resumed from its checkpoint, or new.
 
     Args:
         folder: run folder; made if need be.
@@ -226,7 +226,7 @@ def _warm_start(agent: Agent, path: Path, training: TrainingSettings) -> Trainin
 
 
 def _replay_of(init_from: str | None) -> dict[str, Any]:
-    """The experience in a run's newest checkpoint."""
+    """Return the replay buffer's state in a run's newest checkpoint."""
     folder = Path(init_from).parent if init_from and Path(init_from).suffix != POLICY_SUFFIX else None
     saved = Checkpoints(folder).load() if folder else None
     if saved is None:

@@ -57,10 +57,10 @@ class Checkpoints:
             ) from error
 
     def load(self) -> dict[str, Any] | None:
-        """The newest whole checkpoint, or None where there never was one; `notice` says if it is not the newest.
+        """Load the newest whole checkpoint, None if there never was one; set `notice` if it is not the newest.
 
         Raises:
-            InputError: all that there are are damaged.
+            InputError: every checkpoint is damaged.
         """
         self.notice, newest = "", self.folder / FILE
         refusals: list[InputError] = []

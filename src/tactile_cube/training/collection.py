@@ -114,7 +114,7 @@ class SingleCollection:
         return conditions
 
     def take(self) -> TensorDictBase:
-        """The block collected last."""
+        """Return the block collected last."""
         assert self._block is not None, "launch first"
         return self._block
 

@@ -77,7 +77,7 @@ class ProgressLine:
         self.say(" | ".join(filter(None, parts)), in_place=self._stream.isatty())
 
     def _band(self, steps: int) -> str:
-        """What recorded runs had at so many steps, in words; "" where none got there."""
+        """Describe the range of recorded runs at so many steps; "" where none got there."""
         known, *edges = zip(*self._reference, strict=True) if self._reference else ((),)
         if not known or not known[0] <= steps <= known[-1]:
             return ""
@@ -85,7 +85,7 @@ class ProgressLine:
         return f" (recorded runs {low:.2f} to {high:.2f})"
 
     def _left(self, steps: int, rate: float) -> str:
-        """The time left, in words: to where recorded runs ended, beyond that to the last step."""
+        """Describe the time left: to the end of recorded runs, beyond that to the last step."""
         usual = self._reference[-1][0] if self._reference else self._total
         sooner = steps < usual < self._total
         ahead = max((usual if sooner else self._total) - steps, 0) + self.later  # the last barrier may lie beyond

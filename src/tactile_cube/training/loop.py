@@ -91,7 +91,7 @@ class Learner:
         return self.steps, self.episodes.mean_angle, *([worlds.odds] if worlds.ranges else [])
 
     def state_dict(self) -> dict[str, Any]:
-        """Everything that a resumed run needs; valid at barriers only."""
+        """Return everything that a resumed run needs; valid at barriers only."""
         return {
             "agent": self.agent.state_dict(),
             "replay": self.replay.state_dict(),

@@ -86,7 +86,7 @@ class Replay:
         return batch
 
     def state_dict(self) -> dict[str, Any]:
-        """The transitions by key, in the order of the ring, where to write next, and the generator."""
+        """Return the transitions by key in the order of the ring, the write position, and the generator."""
         held = self.buffer[:] if len(self) else {key: torch.zeros(0, width) for key, width in self.widths.items()}
         return {
             "transitions": [held[key].clone() for key in self.widths],

@@ -45,7 +45,7 @@ class Finished:
 
     @classmethod
     def of(cls, folder: Path, config: dict[str, Any]) -> Self | None:
-        """How the run in a folder ended under exactly these settings; None where it did not, or shall start over."""
+        """Return how the run in a folder ended under exactly these settings; None if it did not or starts over."""
         try:
             found = cls(**json.loads((folder / FILE).read_text()))
         except (OSError, ValueError, TypeError):
@@ -89,7 +89,7 @@ class Run:
     best_score: float = 0.0
 
     def __post_init__(self) -> None:
-        """A session begins."""
+        """Begin a session."""
         learner, settings = self.learner, self.learner.settings
         self.total = -(-settings.steps // self.iteration_steps) * self.iteration_steps
         self.line = ProgressLine(self.total, learner.steps, learner.updates, settings.reference)

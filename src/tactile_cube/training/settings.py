@@ -94,6 +94,6 @@ class TrainingSettings(BaseModel):
         return " and ".join(filter(None, parts))
 
     def mastered(self, angle: float, kept: float) -> bool:
-        """Whether a mean final angle [rad] and a share of cubes kept are above all that a run finishes early at."""
+        """Return whether a mean final angle [rad] and a share of cubes kept exceed all limits for an early finish."""
         pairs = ((angle, self.stop_when_angle_above), (kept, self.stop_when_kept_above))
         return bool(self.goal) and all(least is None or value > least for value, least in pairs)

@@ -69,7 +69,7 @@ class EpisodeStatistics:
         return self.endings.count(self.outcomes.index("time_limit")) / WINDOW if full else 0.0
 
     def summary(self) -> dict[str, float]:
-        """Numbers for the log."""
+        """Return the numbers for the log."""
         result = {
             "final_angle": self.mean_angle,
             "final_angle_best": max(self.angles, default=0.0),
@@ -84,7 +84,7 @@ class EpisodeStatistics:
         return result | {f"reward_{name}": value for name, value in zip(self.terms, means, strict=True)}
 
     def state_dict(self) -> dict[str, Any]:
-        """The window and the counts."""
+        """Return the window and the counts."""
         windows = {name: list(getattr(self, name)) for name in WINDOWS}
         return {**windows, "episodes": self.episodes, "faulty": self.faulty, "lost": self.worlds.lost.tolist()}
 
@@ -132,7 +132,7 @@ class TransitionAssembler:
         return self._sum(stream, ready)
 
     def flush(self) -> TensorDictBase:
-        """The waiting steps, bootstrapped from the last state seen; call before the worlds are reset."""
+        """Return the waiting steps, bootstrapped from the last state seen; call before the worlds are reset."""
         stream, self.pending = self.pending, None
         assert stream is not None, "add a block first"
         return self._sum(stream, stream.shape[1])

@@ -25,7 +25,7 @@ SCORE = "score"
 
 
 def measured(summary: Summary) -> dict[str, float]:
-    """What is logged of an engine: sum of rewards, share held, final angle [rad], drift [mm/s], contact shares."""
+    """Return an engine's log: sum of rewards, share held, final angle [rad], drift [mm/s], contact shares."""
     return {
         "return": sum(summary.reward_terms.values()),
         "held": summary.kept / summary.episodes,

@@ -140,7 +140,7 @@ class EnvConfig:
             raise InputError(f"env.stack is {self.stack}; give 1 to {DEEPEST_STACK} readings")
 
     def approximations(self) -> list[str]:
-        """What is computed less well than it could be, in words; [] if nothing."""
+        """Describe what is computed less accurately than it could be; [] if nothing."""
         drawn = self.randomization.values.get("tip_spinning_friction")
         largest = self.constants.tip_spinning_friction if drawn is None else float(drawn.quantile(np.array(ALMOST_ALL)))
         said = unresolved(largest, self.simulation)
@@ -175,16 +175,16 @@ def make_env(config: EnvConfig, worlds: int, seed: int, evaluation: bool = False
 
 
 def rotation_env(config: EnvConfig, poses: StartPoses | GraspTable | None = None) -> RotationEnv:
-    """The task in one new world, without transforms; `poses` are the start poses where they are at hand already."""
+    """Make the task in one new world, without transforms; `poses` are the start poses, if already made."""
     world = World(config.hand, config.simulation, config.effects)
     start = config.start.of(config.hand, config.constants) if poses is None else poses
     return RotationEnv(world, config.task, config.reward, config.randomization, start, config.constants, config.hand)
 
 
 def transforms(config: EnvConfig, explore: bool) -> list[Transform]:
-    """The transforms, from the world to the policy: readings pass them downwards, actions upwards.
+    """Make the transforms, from the world to the policy: readings pass them downwards, actions upwards.
 
-    Those of training alone, the first and the last, only with `explore`.
+    Those for training alone, the first and the last, are included only with `explore`.
     """
     disturbances, hand = config.randomization, config.hand
     half_range = torch.tensor(0.5 * (hand.action_upper - hand.action_lower), dtype=torch.float32)

@@ -67,7 +67,7 @@ def time_chart(label: str, height: float = 240, x_label: str = "time [s]") -> Ax
 
 @matplotlib.rc_context(STYLE)
 def svg(axes: Axes) -> str:
-    """The SVG element of a chart, with a legend above it where something has a label."""
+    """Return the SVG element of a chart, with a legend above it where something has a label."""
     if axes.get_legend_handles_labels()[0]:
         axes.legend(loc="lower left", bbox_to_anchor=(0, 1), borderaxespad=0, borderpad=0.3, ncols=9)
     text = StringIO()
@@ -120,7 +120,7 @@ def heat_map(rows: Sequence[str], columns: Sequence[str], values: Sequence[Seque
 
 @matplotlib.rc_context(STYLE)
 def interval_chart(intervals: Sequence[Interval]) -> str:
-    """One row a value, each on an axis of its own: the interval as a bar, the value as a dot."""
+    """Draw one row per value, each on an axis of its own: the interval as a bar, the value as a dot."""
     axes = empty_chart(ROW * len(intervals) + 12, left=330, right=250, top=6, bottom=6)
     for row, one in enumerate(intervals):
         known = [one.low, one.high, one.value]
@@ -173,7 +173,7 @@ def residual(comparison: Comparison, trial: int, joint: int, before: Comparison 
 
 
 def band(comparison: Comparison, trial: int, joint: int) -> str:
-    """The measured angle of one joint among the randomised simulations, all as differences from the nominal one."""
+    """Draw the measured angle of one joint among the randomised simulations, all relative to the nominal one."""
     time, randomised = comparison.recording.trials[trial].time, comparison.band
     if randomised is None:
         return ""
@@ -223,19 +223,19 @@ def marked(comparison: Comparison, trial: int, joint: int) -> tuple[tuple[float,
 
 
 def worst_trial(comparison: Comparison, joint: int) -> int:
-    """The trial in which a joint's error is largest."""
+    """Return the trial in which a joint's error is largest."""
     name = comparison.recording.joints[joint]
     return int(np.argmax([errors.joints[name] for errors in comparison.trials]))
 
 
 def _measured(comparison: Comparison, trial: int, joint: int) -> Array:
-    """The angles of a joint (n,), nan where a dropped sample was interpolated: nothing was measured there."""
+    """Return the measured angles of a joint (n,), nan where a dropped sample was interpolated."""
     one = comparison.recording.trials[trial]
     return np.where(one.valid, one.position[:, joint], np.nan)
 
 
 def _simulated(comparison: Comparison, trial: int, joint: int) -> Array:
-    """The angles of a joint (n,) with the constant that was removed from the residual [rad]."""
+    """Return the angles of a joint (n,) with the constant that was removed from the residual [rad]."""
     simulated = comparison.simulated[trial].position
     difference = comparison.recording.trials[trial].position - simulated - comparison.residuals[trial]
     return simulated[:, joint] + float(np.nanmean(difference[:, joint]))

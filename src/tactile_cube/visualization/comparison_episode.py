@@ -48,7 +48,7 @@ def trial_starts(comparison: Comparison) -> list[float]:
 
 
 def _blueprint(comparison: Comparison) -> rrb.Blueprint:
-    """The robot and a summary on the left, one tab a joint on the right."""
+    """Lay out the robot and a summary on the left, one tab per joint on the right."""
     tabs = [
         rrb.Vertical(
             rrb.TimeSeriesView(name=f"{joint}: command, measured, simulated [{unit}]", origin=f"/joints/{joint}/angle"),
@@ -108,7 +108,7 @@ def _log_joint(branch: Branch, comparison: Comparison, index: int, joint: str, s
     times = shown("[rad]", unit)[1]
 
     def joined(parts: Sequence[Array]) -> Array:
-        """All trials on one time line; a missing sample after each interrupts the curve."""
+        """Join all trials on one time line; a missing sample after each interrupts the curve."""
         return np.concatenate([np.append(part[::stride], np.nan) for part in parts])
 
     time = joined([start + trial.time for start, trial in zip(starts, trials, strict=True)])

@@ -23,7 +23,7 @@ FLOORS = {
 
 
 def summary(comparison: Comparison) -> str:
-    """What the command line prints: the answer, one line a joint, where it fails."""
+    """Return the output of the command line: the outcome, one line per joint, where it fails."""
     errors, floor, raw = comparison.errors, comparison.floor, comparison.raw[0]
     unit = common_unit(comparison.recording.shown.values())
     small, times = SMALL[unit]
@@ -61,7 +61,7 @@ def summary(comparison: Comparison) -> str:
 
 
 def outcome(comparison: Comparison) -> str:
-    """The result in one or two sentences."""
+    """Return the result in one or two sentences."""
     unit = common_unit(comparison.recording.shown.values())
     head = (
         f"The simulated joints are {milli(comparison.errors.overall, unit)} (RMS) away from the measured ones; "
@@ -83,7 +83,7 @@ def _cell(value: float, width: int, digits: int) -> str:
 
 
 def recording_section(recording: Recording, model: ModelFile | None) -> Section:
-    """What was compared with what, and what was odd about the recording."""
+    """Describe what was compared with what, and the recording's warnings."""
     seconds = sum(trial.duration for trial in recording.trials)
     kinds = ", ".join(dict.fromkeys(trial.kind for trial in recording.trials))
     starts = len({trial.initialisation for trial in recording.trials})
@@ -110,7 +110,7 @@ def recording_section(recording: Recording, model: ModelFile | None) -> Section:
 
 
 def error_section(comparison: Comparison) -> Section:
-    """The error of each joint beside its noise floor."""
+    """Show the error of each joint beside its noise floor."""
     floor, units = comparison.floor, comparison.recording.shown
     rows = []
     for joint, error in comparison.errors.joints.items():
@@ -161,7 +161,7 @@ def overlay_section(
 
 
 def band_section(comparison: Comparison) -> list[Section]:
-    """The measurement among randomised simulations."""
+    """Show the measurement among randomised simulations."""
     if comparison.band is None:
         return []
     text = [
@@ -181,7 +181,7 @@ def band_section(comparison: Comparison) -> list[Section]:
 
 
 def test_section(comparison: Comparison) -> Section:
-    """What is left beside the noise floor, and, where it is more, what it goes with."""
+    """Show the error over the noise floor and, where it is above, the signals that it follows."""
     ratios = {joint: error / comparison.floor.joints[joint] for joint, error in comparison.errors.joints.items()}
     memory = {one.joint: f"{1e3 * one.correlation_time:.0f} ms" for one in comparison.whiteness}
     rows = [(joint, f"{ratio:.2f}", memory[joint]) for joint, ratio in ratios.items()]
@@ -208,7 +208,7 @@ def test_section(comparison: Comparison) -> Section:
 
 
 def method_section() -> Section:
-    """How the numbers were made."""
+    """Describe how the numbers were computed."""
     lines = [
         "Error: root mean square of measured minus simulated angle over all samples of all trials; the mean "
         "difference of each joint in each robot initialisation is removed first, because a joint's zero is "
@@ -227,12 +227,12 @@ def method_section() -> Section:
 
 
 def probability(value: float) -> str:
-    """A probability; very small ones are only said to be small."""
+    """Format a probability; very small ones only as below a bound."""
     return "< 0.001" if value < 1e-3 else f"{value:.3f}"
 
 
 def comparison_report(comparison: Comparison, command: str, model_path: str | None) -> Report:
-    """The whole page.
+    """Make the whole page.
 
     Args:
         comparison: what was found.
@@ -258,7 +258,7 @@ def comparison_report(comparison: Comparison, command: str, model_path: str | No
 
 
 def _next_section(comparison: Comparison, model_path: str | None) -> Section:
-    """What to type next."""
+    """Show the command to type next."""
     model = f" model={model_path}" if model_path else ""
     if comparison.at_the_floor:
         said = "Nothing is missing at this noise. Check the model on a recording of other motions, or train with it:"

@@ -45,7 +45,7 @@ def stage_section(
     title: str = "How the error falls",
     units: Mapping[str, str] | None = None,
 ) -> Section:
-    """The error after each step, down to the noise floor; `units` are those of the joints, by default rad."""
+    """Show the error after each step, down to the noise floor; `units` are those of the joints, by default rad."""
     units = units or {}
     unit, size = SMALL[common_unit(units.values())]
     bars = [(STAGES.get(key, key), size * v) for key, v in stages.items() if key != "noise_floor" and v is not None]
@@ -68,12 +68,12 @@ def stage_section(
 def held_section(
     stages: Mapping[str, float], joints: Mapping[str, Mapping[str, float]], units: Mapping[str, str]
 ) -> Section:
-    """The same of the trials with an object, which refit no constants."""
+    """Show the same for the trials with an object, which refit no constants."""
     return stage_section({k: v for k, v in stages.items() if k != "refitted"}, joints, HELD, units)
 
 
 def effect_section(effects: Sequence[Mapping[str, Any]], units: Mapping[str, str] | None = None) -> list[Section]:
-    """Every effect that was found: parameters with intervals, held-out gain, rivals."""
+    """Show every effect that was found: parameters with intervals, held-out gain, rivals."""
     if not effects:
         return []
     intervals, lines = [], []
@@ -96,7 +96,7 @@ def effect_section(effects: Sequence[Mapping[str, Any]], units: Mapping[str, str
 
 
 def shape_section(shapes: Sequence[Shape], units: Mapping[str, str] | None = None) -> list[Section]:
-    """What the missing torque depends on, where no effect of the catalogue explains it."""
+    """Show what the missing torque depends on, where no effect of the catalogue explains it."""
     if not shapes:
         return []
     text = [
@@ -134,7 +134,7 @@ def ranking_section(ranking: Sequence[Any]) -> list[Section]:
 
 
 def value_section(comparison: Comparison) -> Section:
-    """The constants of the model and their intervals, beside what the owner believed."""
+    """Show the constants of the model and their intervals, beside the owner's values."""
     rows = []
     if comparison.model is not None:
         for key, by_joint in comparison.model.values.items():
@@ -148,7 +148,7 @@ def value_section(comparison: Comparison) -> Section:
 
 
 def train_section(model_path: str) -> Section:
-    """What to type after an identification."""
+    """Show the command to type after an identification."""
     said = "Train with what was found; the intervals become randomisation ranges:"
     return Section("What to do next", [said], [Listing([f"{TRAIN}{model_path}"], code=True)])
 
@@ -156,7 +156,7 @@ def train_section(model_path: str) -> Section:
 def next_section(
     diagnosis: Mapping[str, Any], model_path: str, recording: Recording, experiment: Experiment | None
 ) -> Section:
-    """What to record or to type next."""
+    """Show what to record or to type next."""
     if experiment is not None:
         return _experiment_section(experiment, recording.units)
     # Effects of fingertips and object belong to no joint.
@@ -193,7 +193,7 @@ def next_section(
 
 
 def _experiment_section(experiment: Experiment, units: Mapping[str, str]) -> Section:
-    """The commands that would decide, what each rival predicts, and between what nothing would decide."""
+    """Show the commands that would decide, the rivals' predictions, and the rivals that nothing would separate."""
     rows, blocks = joint_rows(experiment, units), list[Block]()
     if rows:
         bound = "stop beyond" if experiment.safety.safe else "allowed"
@@ -222,7 +222,7 @@ def diagnosis_report(
     shapes: Sequence[Shape] = (),
     experiment: Experiment | None = None,
 ) -> Report:
-    """The page of a diagnosis.
+    """Make the page of a diagnosis.
 
     Args:
         diagnosis: the content of diagnosis.json.
@@ -231,7 +231,7 @@ def diagnosis_report(
         command: the command line that made it.
         model_path: the recommended model's file.
         shapes: shape of what stays unexplained.
-        experiment: what would tell the rivals apart.
+        experiment: the one that would separate the rivals.
     """
     units = before.recording.shown
     return Report(
@@ -262,7 +262,7 @@ def identification_report(
     model_path: str,
     further: Sequence[Section] = (),
 ) -> Report:
-    """The page of an identification: the error of each stage, the values found, the fitted model beside the recording.
+    """Make the page of an identification: error of each stage, values found, fitted model beside the recording.
 
     Args:
         after: the fitted model beside the recording.
@@ -270,7 +270,7 @@ def identification_report(
         joints: the same stage -> joint -> error [rad].
         command: the command line that made it.
         model_path: the model file that was written.
-        further: what trials with an object say.
+        further: the sections on trials with an object.
     """
     steps = [value for key, value in stages.items() if key != "noise_floor" and value is not None]
     effects = after.model.effects if after.model is not None else []
@@ -298,7 +298,7 @@ def identification_report(
 
 
 def contact_diagnosis_report(result: dict[str, Any], recording: Recording, command: str, model_path: str) -> Report:
-    """The page of a diagnosis of fingertips and object alone, from the content of diagnosis.json."""
+    """Make the page of a diagnosis of fingertips and object alone, from the content of diagnosis.json."""
     units = recording.shown
     return Report(
         title=f"What is missing? {recording.name}",
@@ -315,7 +315,7 @@ def contact_diagnosis_report(result: dict[str, Any], recording: Recording, comma
 
 
 def contact_report(found: ContactIdentification, recording: Recording, command: str, model_path: str) -> Report:
-    """The page of an identification of contact effects alone."""
+    """Make the page of an identification of contact effects alone."""
     unit = common_unit(recording.shown.values())
     effects = [{"name": one.effect, "joints": ["object"], "parameters": one.parameters} for one in found.effects()]
     return Report(

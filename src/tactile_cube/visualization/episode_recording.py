@@ -212,7 +212,7 @@ def _log_policy(branch: Branch, record: EpisodeRecord, hand: Hand) -> None:
 
 
 def _joint_lines(branch: Branch, entity: str, time: Array, values: Array, colours: Colours | None = None) -> None:
-    """A signal (n, joints) of one finger."""
+    """Log a signal (n, joints) of one finger as lines."""
     joints, signal = range(values.shape[1]), entity.rpartition("/")[2]
     painted = None if colours is None else _cycled(colours, joints)
     branch.lines(entity, time, values, [f"{signal}, joint {joint + 1}" for joint in joints], painted)

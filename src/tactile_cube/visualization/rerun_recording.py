@@ -79,7 +79,7 @@ def _scene(root: str, name: str, hand_name: str) -> rrb.View:
 
 
 def _finger_views(finger: str, curve: Callable[..., rrb.View]) -> rrb.Container:
-    """What the policy gets of a finger, what becomes of its action, what the drives do."""
+    """Make a finger's views: the policy's input, the path of its action, the drives."""
     joints, policy = f"joints/{finger}", f"policy/{finger}"
     gets = [curve(f"{finger}: {name} as the policy gets it [rad]", f"{policy}/{name}") for name in ("q_m", "e_q")]
     action = [
@@ -95,7 +95,7 @@ def _finger_views(finger: str, curve: Callable[..., rrb.View]) -> rrb.Container:
 
 
 def whole(views: rrb.Container) -> rrb.Blueprint:
-    """A layout with the time line of episodes, and with nothing of the viewer's own panels."""
+    """Return a layout with the time line of episodes and without the viewer's own panels."""
     return rrb.Blueprint(
         views,
         rrb.TimePanel(state="collapsed", timeline=TIMELINE),
@@ -194,9 +194,9 @@ def recording_file(
 
 
 def _arrange(stream: rr.RecordingStream, blueprint: rrb.Blueprint, application: str) -> None:
-    """What `stream.send_blueprint(blueprint)` does, but the blueprint's own stream is closed after it.
+    """Send a blueprint as `stream.send_blueprint(blueprint)` does, then close the blueprint's own stream.
 
-    Rerun's keeps that stream, two threads, for good: its memory refers to it, and it to its memory (rerun-sdk 0.41.0).
+    Rerun's never frees that stream and its two threads: stream and memory refer to each other (rerun-sdk 0.41.0).
     """
     native = rerun_bindings.new_blueprint(
         application_id=application, make_default=False, make_thread_default=False, default_enabled=True

@@ -42,7 +42,7 @@ def _figure(height: int, x: str, y: str, tools: str = TOOLS, **more: object) -> 
 
 
 def _line(made: figure, name: str, color: str, kind: str = "line", **more: Any) -> models.GlyphRenderer:
-    """A line, or several, without data; `name` stands in the legend."""
+    """Draw a line, or several, without data; `name` is its label in the legend."""
     drawn: models.GlyphRenderer = getattr(made, kind)(
         "x", "y", source=models.ColumnDataSource({"x": [], "y": []}), color=color, legend_label=plain(name), **more
     )

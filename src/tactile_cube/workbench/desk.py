@@ -45,7 +45,7 @@ class Desk:
         self._forget()
 
     def _forget(self) -> None:
-        """What was seen beside a model that is no longer in force."""
+        """Clear the results that belong to a model no longer in use."""
         self.looks: dict[str, list[list[Look]]] = {}  # joint -> candidates, best first, those that look alike together
         self.explainable: dict[str, float] = {}  # joint -> part of the missing torque that any law could explain
         self.chosen, self.promised = "", 0.0  # candidate looked at, NAME@JOINT; error over noise that it would leave
@@ -163,7 +163,7 @@ class Desk:
         self.do("importing", run)
 
     def _place(self, what: str) -> Path:
-        """A folder that is not there yet."""
+        """Return a folder that does not exist yet."""
         return self.folder / f"{what}_{self.version}_{len(list(self.folder.glob(f'{what}_*')))}"
 
     def _load(self, folder: Path) -> None:
@@ -280,7 +280,7 @@ def _path(text: str) -> Path:
 
 
 def _is_hand(joints: Sequence[str]) -> bool:
-    """Whether these are all joints of the hand that is trained, or those of one of its fingers."""
+    """Return whether these are all joints of the hand that is trained, or those of one of its fingers."""
     hand = DLR_HAND2.joint_names
     known = [one for joint in joints for one in hand if one == joint or one.endswith(f"_{joint}")]
     return sorted(known) == sorted(hand)

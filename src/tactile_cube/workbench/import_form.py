@@ -132,14 +132,14 @@ class ImportForm:
         self.columns.children = [self._columns_of(*one, seen.columns) for one in seen.guess.items()]
 
     def _columns_of(self, name: str, guess: dict[str, str], columns: list[str]) -> Row:
-        """A select of columns for each signal of a joint, or for the time."""
+        """Make a select of columns for each signal of a joint, or for the time."""
         selects = [select(signal, width=140) for signal in guess]
         for one, column in zip(selects, guess.values(), strict=True):
             choose(one, [NONE, *columns], column)
         return row_of(text_of("" if name == "time" else name, sizing_mode="fixed", width=80), *selects, name=name)
 
     def _chosen_columns(self) -> dict[str, Any]:
-        """As `source.columns`; nothing where they are as guessed."""
+        """Return the chosen columns as `source.columns`; nothing if they are as guessed."""
         chosen = {
             row.name: {one.title: "" if one.value == NONE else one.value for one in row.children[1:]}
             for row in self.columns.children

@@ -177,7 +177,7 @@ def number(key: str, text: str) -> float:
 
 
 def _numbers(key: str, text: str) -> float | int | list[float] | list[int]:
-    """One number, or one for each of several joints or files."""
+    """Read one number, or one for each of several joints or files."""
     numbers = [number(key, part) for part in re.split(r"[\s,;]+", text.strip(" ,;[]\t\n"))]
     whole = [int(one) for one in numbers if one.is_integer()]
     if key == "initialisation":
@@ -212,7 +212,7 @@ def import_logs(out: Path, given: Mapping[str, Any], before: Recording | None = 
 
 
 def _added(before: Recording, made: RecordingTables, controller: Mapping[str, Any]) -> RecordingTables:
-    """The trials of a recording, and after them those of another one of the same rig."""
+    """Return the trials of a recording, followed by those of another one of the same rig."""
     joints, described = before.joints, before.description
     if tuple(made.description.joints) != joints:
         raise InputError(f"{before.folder}: has joints {', '.join(joints)}; say columns of all of them in the new logs")
@@ -241,6 +241,6 @@ def _added(before: Recording, made: RecordingTables, controller: Mapping[str, An
 
 
 def _in_a_line(what: str, how: str, by: str) -> str:
-    """What was understood, marked as a guess where values told it."""
+    """Describe one thing understood, marked as a guess where it was inferred from values."""
     guess = "guess: " if by.startswith(("values", "steps", "assumed")) else ""
     return f"{guess}{what}: {how}" + (f" ({by})" if by else "")

@@ -78,7 +78,7 @@ class Page:
         widget.on_change(what, changed)
 
     def _new(self, part: str, *depends_on: object) -> bool:
-        """Whether a part is to be drawn anew."""
+        """Return whether a part must be drawn anew, and store what it depends on."""
         changed = self.drawn.get(part) != depends_on
         self.drawn[part] = depends_on
         return changed
@@ -250,7 +250,7 @@ class Page:
         show(self.status, LIVE.format(html(busy, problem, notes, hint)))
 
     def _show_diagnosis(self, bench: Workbench) -> None:
-        """How far the diagnosis is, or what it answered."""
+        """Show the progress of the diagnosis, or its result."""
         desk, found = self.desk, self.desk.found
         self.start.label = "Stop" if desk.running else "Diagnose"
         self.accept.disabled = found is None or not set(found.effects) - set(bench.effects)
@@ -323,7 +323,7 @@ class Page:
         )
 
     def _show_card(self, bench: Workbench) -> None:
-        """The chosen candidate's card, and what it would leave once that is known."""
+        """Show the chosen candidate's card, and the error that it would leave once that is known."""
         now, then, lines = bench.stage.over_noise, self.desk.promised, []
         if self.desk.chosen == f"{self.candidate}@{self.joint.value}":
             verdict = "would not get smaller" if then >= now else "would fall"

@@ -144,7 +144,7 @@ class Workbench:
         return list(dict.fromkeys(t.name for part in (self.search.held_out, self.untouched) for t in part.trials))
 
     def trial(self, name: str) -> Trial:
-        """One trial by its name."""
+        """Return one trial by its name."""
         return next(one for one in self.recording.trials if one.name == name)
 
     def simulate(self, trial: str, model: Model | None = None) -> Simulated:
@@ -373,7 +373,7 @@ class Workbench:
 
 
 def _together(ranked: Sequence[Look], view: Screen) -> list[list[Look]]:
-    """Those that change the prediction alike, beside all constants, together."""
+    """Group the looks that change the prediction alike, apart from what constants can change."""
     _, products = view.products(np.stack([look.change for look in ranked], axis=-1))
     size = np.sqrt(np.diag(products))
     alike = np.abs(products) >= ALIKE * np.outer(size, size)

@@ -24,7 +24,7 @@ def column_of(*parts: LayoutDOM, **more: Any) -> Column:
 
 
 def text_of(*parts: str, styles: dict[str, str] | None = None, **more: Any) -> Div:
-    """A text as wide as the window allows."""
+    """Make a text as wide as the window allows."""
     wrapped = {"overflow-wrap": "anywhere"} | (styles or {})
     pane = Div(disable_math=True, styles=wrapped, **{"sizing_mode": "stretch_width"} | more)
     show(pane, *parts)
@@ -32,17 +32,17 @@ def text_of(*parts: str, styles: dict[str, str] | None = None, **more: Any) -> D
 
 
 def field(title: str, width: int = 170, **more: Any) -> TextInput:
-    """A text to type."""
+    """Make a text field."""
     return TextInput(title=plain(title), width=width, **more)
 
 
 def select(title: str, *values: str, width: int = 190) -> Select:
-    """A choice of values, the first of them chosen."""
+    """Make a select of values, with the first of them chosen."""
     return Select(title=plain(title), options=[*map(plain, values)], value=values[0] if values else "", width=width)
 
 
 def button(label: str, work: Callable[[], object], kind: str = "default", **more: Any) -> Button:
-    """A button that does something."""
+    """Make a button that runs `work`."""
     made = Button(label=plain(label), button_type=kind, **{"width": 150, "align": "end"} | more)
     made.on_click(lambda: work())
     return made
