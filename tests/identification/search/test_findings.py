@@ -8,6 +8,7 @@ import pytest
 
 from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.identification.criteria import Criteria
+from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.search.candidates import Candidate
 from tactile_cube.identification.search.explanation import named_by
 from tactile_cube.identification.search.findings import find, together
@@ -103,6 +104,18 @@ def test_laws_are_tried_where_a_set_fails_most(heavier: Recording) -> None:
         few = failing_windows(search, replace(search.base.fit, residual=residual))
         assert 0 < len(few) < len(windows)
         assert any(np.array_equal(one, windows.measured[window]) for one in few.measured)
+
+
+def test_windows_that_are_not_fitted_are_where_the_base_model_fails(heavier: Recording) -> None:
+    search = Search(*held_out_split(heavier), np.full(1, NOISE), EFFECTS, lambda line: None, segments=48)
+    before, every = search.base, Problem(search.shooting, search.all_windows)
+    every.linearise_starts(before.fit.model)
+    left = every.cost(every.residual(every.prediction(before.fit.model))).reshape(len(every.windows), -1).sum(axis=1)
+    search.focus()
+    assert 1 < len(search.problem.windows) < len(every.windows)
+    worst = search.all_windows.measured[left.argmax()]
+    assert any(np.array_equal(one, worst) for one in search.problem.windows.measured)
+    assert search.base is not before
 
 
 def test_a_law_is_never_made_much_larger_than_its_own_steps_made_it() -> None:

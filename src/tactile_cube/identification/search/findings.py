@@ -102,6 +102,8 @@ class Findings:
 
 def find(search: Search) -> Findings:
     """Search a recording for the effects that its model lacks."""
+    if search.base.largest_error > search.criteria.adequate and not off(search, search.base.fit):
+        search.focus()
     base, nominal = search.base, search.judged(search.start)
     search.say(f"base refitted: held-out error {base.error:.2f} x sensor noise")
     if base.largest_error <= search.criteria.floor:

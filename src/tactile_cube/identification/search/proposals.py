@@ -25,7 +25,7 @@ from tactile_cube.identification.search.candidates import (
 from tactile_cube.identification.search.evidence import joint_errors, joint_squares
 from tactile_cube.identification.search.explanation import Proposal, at_bound, named_by, priced
 from tactile_cube.identification.search.residual_starts import residual_candidates
-from tactile_cube.identification.search.search import Search, spread
+from tactile_cube.identification.search.search import Search, failing
 from tactile_cube.measurement.replay.windows import Windows
 
 Array = NDArray[np.float64]
@@ -99,11 +99,7 @@ def failing_windows(search: Search, fitted: Fit) -> Windows:
     A law that acts rarely, as a limit does, is visible only where the set fails.
     """
     windows = search.problem.windows
-    wanted = -(-search.segments // (LOOKED_AT * windows.segments))
-    costs = search.problem.cost(fitted.residual).reshape(-1, windows.segments).sum(axis=1)
-    worst = np.argsort(-costs, kind="stable")[: wanted // 2]
-    others = np.setdiff1d(np.arange(len(costs)), worst)
-    return windows.take(np.sort(np.concatenate([worst, others[spread(windows.trial[others], wanted - len(worst))]])))
+    return failing(windows, search.problem.cost(fitted.residual), search.segments // LOOKED_AT)
 
 
 def wanted(search: Search, problem: Problem, frozen: Fit) -> list[Candidate]:

@@ -121,6 +121,14 @@ class Search:
         self.offsets = dict(judgement.model.offsets)
         return Explanation((), second, judgement, 1.0, 0.0)
 
+    def focus(self) -> None:
+        """Fit windows of all trials in which the base model fails, as rare failures may be in none of those fitted."""
+        every, model = Problem(self.shooting, self.all_windows), self.base.fit.model
+        every.linearise_starts(model)
+        costs = every.cost(every.residual(every.prediction(model)))
+        self.problem = Problem(self.shooting, failing(self.all_windows, costs, self.segments // FITTED))
+        del self.base
+
     def windows(self, recording: Recording) -> Windows:
         """Return shooting windows of other trials, cut in the same way."""
         return self.shooting.cut(recording, self.noise, segment=self.segment)
@@ -196,6 +204,15 @@ class Search:
 def some(windows: Windows, segments: int) -> Windows:
     """Return windows of about so many segments, spread over trials and over the time within trials."""
     return windows.take(np.sort(spread(windows.trial, -(-segments // windows.segments))))
+
+
+def failing(windows: Windows, costs: Array, segments: int) -> Windows:
+    """Return windows of about so many segments: half with the largest costs (G,), half spread over the others."""
+    wanted = -(-segments // windows.segments)
+    of_window = costs.reshape(-1, windows.segments).sum(axis=1)
+    worst = np.argsort(-of_window, kind="stable")[: wanted // 2]
+    others = np.setdiff1d(np.arange(len(of_window)), worst)
+    return windows.take(np.sort(np.concatenate([worst, others[spread(windows.trial[others], wanted - len(worst))]])))
 
 
 def spread(trial: NDArray[np.int64], count: int) -> NDArray[np.int64]:
