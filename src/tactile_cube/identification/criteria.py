@@ -17,7 +17,7 @@ class Criteria:
         detail: part of its own error in which a law may differ from the real thing.
         band: standard deviations of the held-out difference from which on one set is worse than another.
         significant: probability that a named set is chance, all that was looked at counted.
-        most: share of the excess error from which on an explanation is a part of the truth.
+        most: share of the excess error that an explanation explains at least; a further effect, of what is left.
         nearly_whole: share from which on it is the whole but for a detail.
         most_simulated: trial time that a search may simulate [s]; then it says what it has.
         margin: part of a joint's limits (half its range, its speed, its torque) that a proposed command keeps free.
