@@ -123,6 +123,16 @@ def test_the_details_of_a_law_are_freed_from_where_its_plain_form_is() -> None:
     assert with_details(candidate, detailed) is None, "all are free already"
 
 
+def test_a_detail_that_changes_nothing_near_its_neutral_value_starts_elsewhere() -> None:
+    """A torque limit whose softness is below 0.02 is a hard one, so no derivative leads away from there."""
+    limit = Candidate(find_effect("torque_saturation"), ("q2",), {"limit": 0.1})
+    model, _ = limit.added_to(Model({}, (), {}))
+    found = with_details(limit, model)
+    assert found is not None
+    assert model.terms[0].values["softness"] == 0.0
+    assert found[1].terms[0].values["softness"] == 0.3
+
+
 @pytest.mark.parametrize(("harmonic", "told"), [(6.0, False), (10.0, True)])
 def test_overtones_are_told_where_a_ripple_is_seen_to_repeat(harmonic: float, told: bool) -> None:
     """A finger's 1.2 rad are 1.1 and 1.9 periods; three waves follow any torque over a single one."""

@@ -81,8 +81,6 @@ def test_a_search_that_comes_nowhere_near_the_whole_looks_no_further(tmp_path: P
     [
         # coarse differences point the wrong way from the usual exponent of 2, and a drag took a part of the rest
         ("stribeck_friction", {"excess": 0.15, "velocity": 0.1, "exponent": 0.5}, "nonlinear_drag"),
-        # what the softness changes is nothing near 0
-        ("torque_saturation", {"limit": 0.5, "softness": 0.4}, "torque_curve"),
         ("joint_stop", {"upper": 0.6, "stiffness": 3.0, "exponent": 2.0, "depth": 0.1}, "position_torque"),
     ],
 )

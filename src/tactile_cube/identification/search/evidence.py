@@ -125,12 +125,8 @@ def worse(other: Judgement, best: Judgement, criteria: Criteria = STANDARD) -> b
 
 
 def lacking(less: Judgement, more: Judgement, criteria: Criteria = STANDARD, looked_at: int = 1) -> bool:
-    """Return whether a set is significantly better than a subset, corrected for the number of laws screened.
-
-    If the subset is within the tolerated error, the difference also has to exceed a law's difference in detail.
-    """
-    earned = gain(less, more) > criteria.least_gain and p_value(less, more) * looked_at <= criteria.significant
-    return earned and (less.joint_errors.max() > criteria.tolerated or worse(less, more, criteria))
+    """Return whether a set is significantly better than a subset, corrected for the number of laws screened."""
+    return gain(less, more) > criteria.least_gain and p_value(less, more) * looked_at <= criteria.significant
 
 
 def likelihood(before: Judgement, after: Judgement) -> Array:
