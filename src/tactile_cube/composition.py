@@ -41,7 +41,7 @@ def help_text(name: str) -> str:
 
 
 def commands() -> dict[str, str]:
-    """Commands of the package and the first line of what they say about themselves, without importing them."""
+    """Return commands of the package and the first line of what they say about themselves, without importing them."""
     table = ast.parse((Path(__file__).parent / "commands.py").read_text(encoding="utf-8"))
     said = {part.name: ast.get_docstring(part) or "" for part in table.body if isinstance(part, ast.FunctionDef)}
     return {name: said[name].partition("\n")[0] for name in sorted(path.stem for path in CONFIG.glob("*.yaml"))}

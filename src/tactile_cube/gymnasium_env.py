@@ -106,7 +106,7 @@ class GymnasiumRotation(gymnasium.Env[Observation, Observation]):
             self._scene = None
 
     def close(self) -> None:
-        """Closes the world and its pictures."""
+        """Close the world and its pictures."""
         self._close_scene()
         self._env.close()
 

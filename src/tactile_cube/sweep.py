@@ -61,7 +61,7 @@ class Jobs:
         return objective
 
     def ended(self) -> dict[Path, bool]:
-        """Folder -> whether its job succeeded, of all that ended; asked once, when all have."""
+        """Return folder -> whether its job succeeded, of all that ended; asked once, when all have."""
         record = SweepFolder.path and SweepFolder.path / self._record
         if not record or not record.is_file():
             return {}
@@ -76,7 +76,7 @@ def register_sweep_folder() -> None:
 
 
 def sweep_folder(overrides: str, seed: int) -> str:
-    """Folder of one run of a sweep: what it overrides beside the seed, and the seed.
+    """Return the folder of one run of a sweep: what it overrides beside the seed, and the seed.
 
     Example:
         >>> sweep_folder("task=table-agent.gamma=0.9", 1), sweep_folder("", 1)

@@ -146,20 +146,20 @@ class Agent(ABC):
         return {"loss": self.loss.state_dict(), "optimizer": self.optimizer.state_dict()}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Inverse of `state_dict`; refuses a state of other shapes."""
+        """Restore what `state_dict` returned; a state of other shapes is refused."""
         self.loss.load_state_dict(state["loss"])
         self.optimizer.load_state_dict(state["optimizer"])
 
     def load_networks(self, state: dict[str, Any]) -> None:
-        """Warm start: networks and targets of a state, fresh optimiser and temperature."""
+        """Load networks and targets of a state; optimiser and temperature stay fresh (warm start)."""
         self.loss.load_state_dict(state["loss"] | {"log_alpha": self.loss.state_dict()["log_alpha"]})
 
     def load_actor(self, actor: Actor) -> None:
-        """Warm start of the actor alone, as from a policy file: critics stay fresh."""
+        """Load the actor alone, as from a policy file; critics stay fresh (warm start)."""
         self.actor.load_state_dict(actor.state_dict())
 
     def approximations(self) -> list[str]:
-        """Deviations from exact float32 arithmetic, one sentence each, printed at the start of a run."""
+        """Return the deviations from exact float32 arithmetic, one sentence each, printed at the start of a run."""
         if self.settings.product_dtype != torch.bfloat16:
             return []
         asked = f"agent.precision={self.settings.precision}"

@@ -28,7 +28,7 @@ class Sizes:
 
 
 def perceptron(sizes: Sequence[int], layer_norm: bool = False) -> nn.Sequential:
-    """Linear layers with ReLU between them, e.g. sizes (120, 512, 512, 24)."""
+    """Build linear layers with ReLU between them, e.g. sizes (120, 512, 512, 24)."""
     layers: list[nn.Module] = []
     for fan_in, fan_out in itertools.pairwise(sizes[:-1]):
         layers.append(nn.Linear(fan_in, fan_out))
@@ -66,7 +66,7 @@ class Actor(nn.Module):
         self.body = perceptron((sizes.observation, *hidden, 2 * sizes.action))
 
     def forward(self, observation: Tensor) -> tuple[Tensor, Tensor]:
-        """Mean and scale of the Gaussian before tanh, each (batch, action)."""
+        """Return the mean and scale of the Gaussian before tanh, each (batch, action)."""
         mean, log_sigma = self._gaussian(observation)
         return mean, log_sigma.exp()
 
@@ -99,7 +99,7 @@ class Critic(nn.Module):
         self.body = perceptron((sizes.critic, *hidden, outputs), layer_norm)
 
     def forward(self, observation: Tensor, privileged: Tensor, action: Tensor) -> Tensor:
-        """State-action value (batch, outputs); several outputs are its quantiles."""
+        """Return the state-action value (batch, outputs); several outputs are its quantiles."""
         value: Tensor = self.body(torch.cat((observation, privileged, action), -1))
         return value
 
@@ -112,5 +112,5 @@ def lowest(critics: Iterable[nn.Module], observation: Tensor, privileged: Tensor
 def build_networks(
     sizes: Sizes, hidden: Sequence[int], layer_norm: bool, critics: int = 2, outputs: int = 1
 ) -> tuple[Actor, list[Critic]]:
-    """Actor and critics with torch's default initialisation, drawn in this order from torch's generator."""
+    """Return the actor and critics with torch's default initialisation, drawn in this order from torch's generator."""
     return Actor(sizes, hidden), [Critic(sizes, hidden, layer_norm, outputs) for _ in range(critics)]

@@ -28,7 +28,7 @@ class PlainLoss(nn.Module):
         self.log_alpha = nn.Parameter(torch.tensor(settings.alpha_init).log())
 
     def forward(self, batch: TensorDictBase) -> dict[str, Tensor]:
-        """Losses whose sum is to be differentiated, and what the log shows."""
+        """Return the losses whose sum is to be differentiated, and what the log shows."""
         state, following = (batch["observation"], batch["privileged"]), batch["next"]
         alpha = self.log_alpha.detach().exp()
         with torch.no_grad():

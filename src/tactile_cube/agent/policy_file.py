@@ -78,7 +78,7 @@ class PolicyInfo(BaseModel):
 
     @classmethod
     def describe(cls, actor: Actor, **provenance: Any) -> Self:
-        """Sizes read off the actor, the rest as given."""
+        """Return the sizes read off the actor, the rest as given."""
         widths = [layer.out_features for layer in actor.layers()]
         return cls(
             observation_size=actor.layers()[0].in_features,
@@ -153,7 +153,7 @@ def require_sizes(path: Path | str, info: PolicyInfo, observation_size: int, act
 
 
 def current_commit() -> str:
-    """Commit of the checkout this code runs from, "-dirty" appended when it was changed; "unknown" elsewhere."""
+    """Return commit of the checkout this code runs from, "-dirty" appended when it was changed; "unknown" elsewhere."""
     command = ["git", "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"]
     try:
         run = subprocess.run(command, cwd=Path(__file__).parent, capture_output=True, text=True, timeout=5, check=True)

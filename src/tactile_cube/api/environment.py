@@ -93,6 +93,6 @@ def search_grasps(config: EnvConfig | None = None, *, grasps: int = 2000, seed: 
 
 
 def grasps_of(env: EnvConfig, options: SimulationOptions, grasps: int, seed: int, command: str) -> Grasps:
-    """Grasps of an environment's hand and object; their file says which command found them."""
+    """Return the grasps of an environment's hand and object; their file says which command found them."""
     found = find_grasps(World(env.hand, options), env.constants, grasps, seed)
     return replace(found, origin=found.origin | {"command": command, "commit": current_commit()})

@@ -89,7 +89,7 @@ def called_job(command: str, given: Mapping[str, Any]) -> Job:
 
 
 def settings_of(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Keys and groups of the configuration, and what a call's keywords set them to."""
+    """Return the keys and groups of the configuration, and what a call's keywords set them to."""
     keywords = {key: value for key, value in given.items() if key not in NO_KEYS and value is not None}
     return keywords | dict(given.get("values") or {})
 

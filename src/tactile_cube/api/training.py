@@ -66,7 +66,7 @@ class TrainingResult:
         return self.folder / POLICY
 
     def curve(self) -> dict[str, list[float]]:
-        """Columns of metrics.csv, one number for each line of the log."""
+        """Return the columns of metrics.csv, one number for each line of the log."""
         return read_curve(self.folder, self.folder.name).columns
 
 

@@ -69,7 +69,7 @@ class CommandGuard:
         return doubt
 
     def since_sent(self, now: float) -> float:
-        """Time since the last command by the robot's clock [s]; nan before the first."""
+        """Return the time since the last command by the robot's clock [s]; nan before the first."""
         return now - self._sent
 
     def checked(self, dt: float, wanted: Array) -> Array:

@@ -50,7 +50,7 @@ class Robot(Protocol):
         """
 
     def release(self) -> None:
-        """Called once, when the policy begins to decide: whoever holds the object lets go of it."""
+        """Let go of the object: called once, when the policy begins to decide."""
 
     def close(self) -> None:
         """End the connection."""

@@ -92,7 +92,7 @@ class SimulatedHand:
         self._q_d, self._sent = np.array(q_d), self._ticks
 
     def wait_for_object(self) -> bool:
-        """Nobody has to confirm: `release` puts the object where somebody would have held it."""
+        """Wait for nobody: `release` puts the object where somebody would have held it."""
         return True
 
     def release(self) -> None:

@@ -142,7 +142,7 @@ class ModelFile(Strict):
         return [one for one in self.effects if one.of_object]
 
     def with_effects(self, found: Sequence[EffectEstimate]) -> list[EffectEstimate]:
-        """Its effects and those found, which take the place of those of the same name."""
+        """Return its effects and those found, which take the place of those of the same name."""
         names = {one.effect for one in found}
         return [*(one for one in self.effects if one.effect not in names), *found]
 

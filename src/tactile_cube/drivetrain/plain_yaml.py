@@ -100,7 +100,7 @@ def _size(value: Any, known: dict[int, int]) -> int:
 
 
 def read_schema(path: Path, schema: type[Schema]) -> Schema:
-    """`path` checked against a pydantic schema; the error names the file, the key and the value received."""
+    """Check `path` against a pydantic schema; the error names the file, the key and the value received."""
     try:
         return schema.model_validate(read_yaml(path))
     except ValidationError as error:

@@ -80,19 +80,19 @@ def spin(step: Step) -> float:
 
 @term(-1, scaled=True)
 def height(step: Step) -> float:
-    """Vertical motion |d_z| [m]."""
+    """Return the vertical motion |d_z| [m]."""
     return abs(step.after.z - step.before.z)
 
 
 @term(-1, scaled=True)
 def plane(step: Step) -> float:
-    """Horizontal motion |d_xy| [m]."""
+    """Return the horizontal motion |d_xy| [m]."""
     return math.hypot(step.after.x - step.before.x, step.after.y - step.before.y)
 
 
 @term(-1, scaled=True)
 def tilt(step: Step) -> float:
-    """Tilting motion |d_psi| + |d_phi| [rad]."""
+    """Return the tilting motion |d_psi| + |d_phi| [rad]."""
     return abs(step.after.psi - step.before.psi) + abs(step.after.phi - step.before.phi)
 
 
@@ -104,7 +104,7 @@ def proximal(step: Step) -> float:
 
 @term(-1)
 def off_centre(step: Step) -> float:
-    """Squared horizontal distance from where the episode began [m^2]. Not in the paper.
+    """Return the squared horizontal distance from where the episode began [m^2]. Not in the paper.
 
     A cube that is dragged aside is lost some twenty steps later, beyond what the discount lets the agent foresee.
     """
@@ -113,7 +113,7 @@ def off_centre(step: Step) -> float:
 
 @term(-1)
 def leaving(step: Step) -> float:
-    """1 in the step that loses the cube. Its weight must exceed what going on costs, or dropping pays."""
+    """Return 1 in the step that loses the cube. Its weight must exceed what going on costs, or dropping pays."""
     return float(step.lost)
 
 
@@ -131,7 +131,7 @@ def advance(step: Step) -> float:
 
 @term(-1)
 def climb(step: Step) -> float:
-    """Squared height above where the episode began [m^2]. Not in the paper, as all that follow.
+    """Return the squared height above where the episode began [m^2]. Not in the paper, as all that follow.
 
     A cube that climbs into the hand runs with its upper edge against links that are no fingertips.
     """
@@ -140,7 +140,7 @@ def climb(step: Step) -> float:
 
 @term(-1)
 def link_spin(step: Step) -> float:
-    """Rotation in a step at whose end another link than a fingertip touches the object [rad].
+    """Return the rotation in a step at whose end another link than a fingertip touches the object [rad].
 
     With a weight below that of `spin` a hand that rests has nothing to gain by it.
     """
@@ -214,7 +214,7 @@ class Reward:
         return np.array([TERMS[name].measure(step) for name in self.weight])
 
     def weights(self, penalty_scale: float = 1.0) -> NDArray[np.float32]:
-        """Signed weights in the order of `terms`: reward = reward_terms @ weights.
+        """Return the signed weights in the order of `terms`: reward = reward_terms @ weights.
 
         Args:
             penalty_scale: factor on height, plane and tilt, from the curriculum.

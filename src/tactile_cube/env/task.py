@@ -52,7 +52,7 @@ def seen_along(frame: Rotation | None, quaternion: Sequence[float]) -> Sequence[
 
 
 def cube_pose(position: Sequence[float], quaternion: Sequence[float], previous_theta: float | None = None) -> CubePose:
-    """Pose from a position (3,) [m] and a quaternion (4,) x, y, z, w.
+    """Return the pose from a position (3,) [m] and a quaternion (4,) x, y, z, w.
 
     The rotation is taken apart as Rz(theta) Ry(phi) Rx(psi). Given the theta of the previous step, theta is unwrapped:
     of all angles that differ by whole turns it is the nearest one, right while the cube turns less than half a turn a

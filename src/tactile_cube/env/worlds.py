@@ -27,7 +27,7 @@ class WorldsEnv(EnvBase):  # type: ignore[misc]
     """
 
     def __init__(self, tasks: Sequence[RotationEnv]) -> None:
-        """Hosts `tasks`."""
+        """Return the host `tasks`."""
         super().__init__(device="cpu", batch_size=[len(tasks)])
         self.tasks = list(tasks)
         self.final_conditions = self.tasks[0].task.conditions()
@@ -73,7 +73,7 @@ class WorldsEnv(EnvBase):  # type: ignore[misc]
             task.odds = odds
 
     def _set_seed(self, seed: int | None) -> None:
-        """Seeds every world, and the generator that the transforms draw from."""
+        """Seed every world, and the generator that the transforms draw from."""
         if seed is not None:
             torch.default_generator.manual_seed(seed)
             self._seed_tasks(seed)

@@ -118,7 +118,7 @@ class Evaluation:
         return self._judged(variant, env, episodes, report)
 
     def _run_displaced(self, results: list[EpisodeResult], report: Report) -> Iterator[VariantResult]:
-        """From displaced starts of the best episode's world: its targets open loop, and the policy."""
+        """Run the targets open loop, and the policy, from displaced starts of the best episode's world."""
         best = max(results, key=lambda result: result.final_angle)
         replay = ReplayPolicy(self.record(self.protocol.variants[0], best).target)
         # The recorded targets hold the repeated actions already.

@@ -115,7 +115,7 @@ def _attempt(
 def _held(
     world: World, constants: EpisodeConstants, start: Array, target: Array, yaw: float
 ) -> tuple[Array, ...] | None:
-    """Angles, targets, position and orientation in the end; None where the object is not held at rest."""
+    """Return the angles, targets, position and orientation in the end; None where the object is not held at rest."""
     quaternion = Rotation.from_euler("z", yaw).as_quat()
     settings = {"filter_time": CLOSING_TIME, "gravity_scale": 1.0, "gravity_onset": CLOSING}
     world.reset(replace(constants, **settings), Start(start, cube_quaternion=quaternion))  # type: ignore[arg-type]

@@ -163,14 +163,14 @@ class LostWhere:
 
 
 def drawn(results: Sequence[EpisodeResult]) -> list[str]:
-    """Constants that differ between the worlds of the episodes."""
+    """Return the constants that differ between the worlds of the episodes."""
     first = results[0].world
     numbers = [name for name, value in first.items() if isinstance(value, float) and name not in NO_PROPERTY]
     return [name for name in numbers if any(result.world[name] != first[name] for result in results)]
 
 
 def lost_where(results: Sequence[EpisodeResult]) -> list[LostWhere]:
-    """Constants that separate kept objects from lost ones, surest first; none where too few were lost or kept.
+    """Return constants that separate kept objects from lost ones, surest first; none where too few were lost or kept.
 
     Source of the test: Mann and Whitney, Annals of Mathematical Statistics 18 (1947).
     """

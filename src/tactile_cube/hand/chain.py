@@ -34,7 +34,7 @@ class Chain:
         return self.motion(position, rotation, q)[0]
 
     def motion(self, position: Array, rotation: Array, q: Array) -> tuple[Array, Array]:
-        """Tip in the world (n, 3) [m] and its velocity per joint velocity (n, 3, J)."""
+        """Return the tip in the world (n, 3) [m] and its velocity per joint velocity (n, 3, J)."""
         count = len(q)
         place, turn = np.zeros((count, 3)), np.broadcast_to(np.eye(3), (count, 3, 3))
         translations, rotations = (position, *self.translations), (rotation, *self.rotations)
@@ -52,7 +52,7 @@ class Chain:
         return tip, jacobian
 
     def angles(self, position: Array, rotation: Array, targets: Array, lower: Array, upper: Array) -> Array:
-        """Angles (n, J) [rad] within limits (J,) that bring the tip to world points (n, 3) [m], or near them.
+        """Return angles (n, J) [rad] within limits (J,) that bring the tip to world points (n, 3) [m], or near them.
 
         Of many solutions it takes one near the middle of the range: damped least squares, with a pull towards the
         middle that fades.
@@ -72,7 +72,7 @@ class Chain:
 
 
 def _least_squares_step(jacobian: Array, miss: Array, wish: Array) -> Array:
-    """Joint steps (n, J) that take away `miss` (n, 3), and go along `wish` (n, J) where that moves no tip."""
+    """Return joint steps (n, J) that take away `miss` (n, 3), and go along `wish` (n, J) where that moves no tip."""
     turned = np.swapaxes(jacobian, 1, 2)
     damping = 1e-7 + 0.1 * np.sum(miss**2, axis=1)
     matrix = jacobian @ turned + damping[:, None, None] * np.eye(3)
@@ -82,7 +82,7 @@ def _least_squares_step(jacobian: Array, miss: Array, wish: Array) -> Array:
 
 
 def _about_z(angle: Array) -> Array:
-    """Rotations (n, 3, 3) about z by angles (n,) [rad]."""
+    """Return the rotations (n, 3, 3) about z by angles (n,) [rad]."""
     turn = np.zeros((len(angle), 3, 3))
     turn[:, 0, 0] = turn[:, 1, 1] = np.cos(angle)
     turn[:, 1, 0] = np.sin(angle)
@@ -112,7 +112,7 @@ class PlanarChain:
         return np.asarray(position + (local[:, None] @ np.swapaxes(rotation, -1, -2))[:, 0])
 
     def angles(self, position: Array, rotation: Array, targets: Array, lower: Array, upper: Array) -> Array:
-        """Angles (n, 3) [rad] that bring the tip to world points (n, 3) [m]; limits are not applied.
+        """Return the angles (n, 3) [rad] that bring the tip to world points (n, 3) [m]; limits are not applied.
 
         Of the two solutions the flexed one (q3 >= 0) is given. A point out of reach gives the straight or the fully
         folded finger that points at it.

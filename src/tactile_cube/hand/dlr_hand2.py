@@ -75,7 +75,7 @@ def _finger(
 
 
 def _moments(link: str) -> tuple[float, float, float]:
-    """Moments about the centre of mass, of a solid cylinder in the capsule's place (x, y, z) [kg m^2]."""
+    """Return the moments about the centre of mass, of a solid cylinder in the capsule's place (x, y, z) [kg m^2]."""
     length, mass, _ = LINKS[link]
     radius, length = (_CAPSULES[link][0], length) if link in _CAPSULES else (0.012, 0.02)
     across = mass * (3.0 * radius**2 + length**2) / 12.0

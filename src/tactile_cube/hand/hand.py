@@ -139,7 +139,7 @@ class Hand:
         return [self.columns.index(column) for column in range(max(self.columns) + 1)]
 
     def coupled(self) -> tuple[tuple[int, int], ...]:
-        """Links of a finger that follow another one of it: (link, leader); both angles are equal."""
+        """Return the links of a finger that follow another one of it: (link, leader); both angles are equal."""
         leaders = enumerate(self._own[column] for column in self.columns)
         return tuple((link, leader) for link, leader in leaders if leader != link)
 
@@ -181,7 +181,7 @@ class Hand:
         return np.array(positions), np.array([self.rotation @ base.rotation for base in self.fingers])
 
     def base_in_world(self, finger: int) -> tuple[Array, Array]:
-        """Position (3,) [m] and rotation (3, 3) of the first joint's frame in the world."""
+        """Return the position (3,) [m] and rotation (3, 3) of the first joint's frame in the world."""
         return self.bases[0][finger], self.bases[1][finger]
 
     def finger_tips(self, finger: int, q: Array) -> Array:
@@ -189,7 +189,7 @@ class Hand:
         return self.fingers[finger].chain.tips(*self.base_in_world(finger), q)
 
     def finger_angles(self, finger: int, targets: Array) -> Array:
-        """Angles (n, joints_per_finger) [rad] that bring a fingertip to world points (n, 3) [m], or near them.
+        """Return angles (n, joints_per_finger) [rad] that bring a fingertip to world points (n, 3) [m], or near them.
 
         The closed form of the DLR-Hand II takes no account of limits, the search of other hands stays within those of
         actions.

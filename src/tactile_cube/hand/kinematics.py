@@ -16,7 +16,7 @@ _REACHED = 1e-5  # A fingertip this near to its target has reached it [m]
 
 
 def tip_positions(hand: Hand, angles: Array) -> Array:
-    """Centres of the fingertip spheres in the world (fingers, 3) [m], for joint angles (joints,) [rad]."""
+    """Return the centres of the fingertip spheres in the world (fingers, 3) [m], for joint angles (joints,) [rad]."""
     q = np.asarray(angles, dtype=np.float64).reshape(-1, hand.joints_per_finger)
     chain = hand.fingers[0].chain
     if isinstance(chain, PlanarChain) and all(finger.chain == chain for finger in hand.fingers):
@@ -32,7 +32,7 @@ def grasp_angles(
     clearance: float = 1e-3,
     shape: ObjectShape = "box",
 ) -> Array:
-    """Joint angles with each finger at its side of the object, tips `clearance` [m] off it (negative: pressing).
+    """Return joint angles with each finger at its side of the object, tips `clearance` [m] off it (negative: pressing).
 
     Each finger aims at the middle of its face. Where the action limits forbid that it takes the nearest point of the
     face that they and the finger's length allow, and where there is none the angles that come nearest.
@@ -63,6 +63,6 @@ def _misses(hand: Hand, finger: int, targets: Array) -> Array:
 
 
 def _within_limits(hand: Hand, finger: int, targets: Array) -> Array:
-    """Angles (n, joints_per_finger) [rad] towards targets (n, 3) [m], clipped to the action limits."""
+    """Return the angles (n, joints_per_finger) [rad] towards targets (n, 3) [m], clipped to the action limits."""
     joints = hand.of_finger(finger)
     return np.clip(hand.finger_angles(finger, targets), hand.action_lower[joints], hand.action_upper[joints])

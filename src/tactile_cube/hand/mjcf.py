@@ -192,7 +192,7 @@ class _Reader:
         return Mjcf(robot_element(escape(name), parts), stated, tuple(self.left_out))
 
     def _body(self, body: int, mimics: dict[int, str]) -> list[str]:
-        """Links and joints of a body: one link for each joint, of which the last one is the body's."""
+        """Return the links and joints of a body: one link for each joint, of which the last one is the body's."""
         m, name = self.model, self.bodies[body]
         parent, first = m.body_parentid[body], m.body_jntadr[body]
         place, turn = m.body_pos[body] - self._shift(parent), _matrix(m.body_quat[body])
@@ -238,7 +238,7 @@ class _Reader:
         return self._named("mjtJoint", self.model.jnt_type[joint])
 
     def _named(self, kind: str, number: int) -> str:
-        """MuJoCo's word for a number of an enumeration, without prefix."""
+        """Return MuJoCo's word for a number of an enumeration, without prefix."""
         return str(getattr(self.mujoco, kind)(int(number)).name).partition("_")[2]
 
     def _mimics(self) -> Iterator[tuple[int, str]]:
@@ -265,7 +265,7 @@ class _Reader:
             self.left_out.append(f"joint '{name}': the spring of {m.jnt_stiffness[joint]:g} N m/rad")
 
     def _actuator(self, k: int) -> None:
-        """Gains and limits of a motor or a position actuator; MuJoCo's forces act on a joint times the gear."""
+        """Return gains and limits of a motor or a position actuator; MuJoCo's forces act on a joint times the gear."""
         m, name = self.model, self.model.actuator(k).name or f"number {k}"
         joint, gear = self.joints[m.actuator_trnid[k, 0]], m.actuator_gear[k, 0]
         if self._named("mjtTrn", m.actuator_trntype[k]) not in ("JOINT", "JOINTINPARENT"):

@@ -74,7 +74,7 @@ class ObjectMesh:
         return cls(vertices, faces, float(arrays["volume"]), com, moments, str(arrays["file"]))
 
     def inertia(self, size: Array) -> Array:
-        """Inertia (3, 3) [m^2] about the centre of mass of 1 kg with a bounding box `size` (3,) [m]."""
+        """Return the inertia (3, 3) [m^2] about the centre of mass of 1 kg with a bounding box `size` (3,) [m]."""
         moments = np.diag(size) @ self.moments @ np.diag(size)
         return np.asarray(np.trace(moments) * np.eye(3) - moments)
 
@@ -159,7 +159,7 @@ def _refuse_odd_size(size: Array, scale: float, where: str) -> None:
 
 
 def _outline(vertices: Array) -> tuple[Array, NDArray[np.int64]]:
-    """Corners and triangles of a hull; of more than `CORNERS` those that lie outermost in so many directions."""
+    """Return corners and triangles of a hull; of more than `CORNERS` those that lie outermost in so many directions."""
     chosen = vertices[ConvexHull(vertices).vertices]
     if len(chosen) > CORNERS:
         kept = np.unique(np.argmax(_directions(CORNERS - 6) @ chosen.T, axis=1))
@@ -174,7 +174,7 @@ def _outline(vertices: Array) -> tuple[Array, NDArray[np.int64]]:
 
 
 def _directions(count: int) -> Array:
-    """Unit vectors (count, 3), evenly spread: a Fibonacci lattice."""
+    """Return the unit vectors (count, 3), evenly spread: a Fibonacci lattice."""
     rank = np.arange(count) + 0.5
     height, turn = 1.0 - 2.0 * rank / count, np.pi * (1.0 + 5.0**0.5) * rank
     across = np.sqrt(1.0 - height**2)
@@ -192,12 +192,12 @@ _ARC = np.radians(30.0)  # the same around a round side [rad]
 
 
 def straight_half(half: Array) -> float:
-    """Half the length of a capsule's straight part [m], from half the edges of its bounding box (3,) [m]."""
+    """Return half the length of a capsule's straight part [m], from half the edges of its bounding box (3,) [m]."""
     return max(float(half[2] - half[0]), 0.0)
 
 
 def unit_inertia(shape: ObjectShape, size: Array) -> Array:
-    """Inertia (3, 3) [m^2] about the centre of mass of a solid of 1 kg with a bounding box `size` (3,) [m]."""
+    """Return inertia (3, 3) [m^2] about the centre of mass of a solid of 1 kg with a bounding box `size` (3,) [m]."""
     if isinstance(shape, ObjectMesh):
         return shape.inertia(size)
     if shape == "box":
@@ -215,7 +215,7 @@ def unit_inertia(shape: ObjectShape, size: Array) -> Array:
 
 
 def tip_centres(shape: ObjectShape, side: Array, half: Array, radius: float, gap: float) -> Array:
-    """Centres (n, 3) [m] of a sphere that stands at a side of the object, the most wanted place first.
+    """Return the centres (n, 3) [m] of a sphere that stands at a side of the object, the most wanted place first.
 
     `side` (3,) is the horizontal unit vector towards the finger, in the object's frame, `half` (3,) half the edges of
     its bounding box, `gap` between sphere and object [m]; negative: it presses.

@@ -113,7 +113,7 @@ class RigidBodyTree:
         return matrix
 
     def expand(self, q: Array) -> Array:
-        """Positions of all dofs (N,) from those of the actuated joints (n,)."""
+        """Return the positions of all dofs (N,) from those of the actuated joints (n,)."""
         positions = np.asarray(q, dtype=float)[self.follow]
         return np.asarray(self.ratio * positions + self.offset)
 

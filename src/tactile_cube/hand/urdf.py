@@ -57,7 +57,7 @@ def robot_element(name: str, parts: Iterable[str]) -> str:
 
 
 def inertial_element(mass: float, com: Array, inertia: Array, digits: int = 10) -> str:
-    """Mass [kg], centre of mass (3,) [m] and inertia (3, 3) about it [kg m^2] as URDF's <inertial>."""
+    """Return the mass [kg], centre of mass (3,) [m] and inertia (3, 3) about it [kg m^2] as URDF's <inertial>."""
     upper = zip(["xx", "xy", "xz", "yy", "yz", "zz"], inertia[np.triu_indices(3)], strict=True)
     moments = " ".join(f'i{axes}="{value:.{digits}g}"' for axes, value in upper)
     place = f'<origin xyz="{number_list(com)}"/>'
@@ -71,7 +71,7 @@ def origin_element(position: Array, rotation: Array | None = None) -> str:
 
 
 def roll_pitch_yaw(rotation: Array) -> Array:
-    """URDF's angles (3,) [rad] of a rotation matrix (3, 3): about fixed x, then y, then z."""
+    """Return the URDF's angles (3,) [rad] of a rotation matrix (3, 3): about fixed x, then y, then z."""
     level = np.hypot(rotation[0, 0], rotation[1, 0])
     pitch = np.arctan2(-rotation[2, 0], level)
     if level < _UPRIGHT:  # roll and yaw turn about the same axis: leave it all to roll

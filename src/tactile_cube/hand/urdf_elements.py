@@ -54,7 +54,7 @@ class Body:
         return Body(self.mass, R @ self.com + place.translation, R @ self.inertia @ R.T)
 
     def joined(self, other: Body) -> Body:
-        """Both bodies as one (parallel-axis theorem)."""
+        """Return both bodies as one (parallel-axis theorem)."""
         mass = self.mass + other.mass
         if mass == 0.0:
             return Body(0.0, self.com, self.inertia + other.inertia)
@@ -177,7 +177,7 @@ def balanced(body: Body, link: str) -> Body:
 
 
 def principal_moments(body: Body) -> Array:
-    """Moments (3,) about its centre of mass, the smallest first [kg m^2]."""
+    """Return the moments (3,) about its centre of mass, the smallest first [kg m^2]."""
     return np.asarray(np.linalg.eigvalsh(body.inertia))
 
 
@@ -191,7 +191,7 @@ def placement_of(element: ElementTree.Element, where: str) -> Placement:
 
 
 def _about(axis: int, angle: float) -> Array:
-    """Rotation matrix about a coordinate axis; quarter turns are exact to rounding."""
+    """Return the rotation matrix about a coordinate axis; quarter turns are exact to rounding."""
     i, j = (axis + 1) % 3, (axis + 2) % 3
     R = np.eye(3)
     R[i, i] = R[j, j] = np.cos(angle)
@@ -212,7 +212,7 @@ def _axis(element: ElementTree.Element, name: str) -> Array:
 
 
 def triple(element: ElementTree.Element, key: str, where: str) -> Array:
-    """Three numbers of an attribute (3,)."""
+    """Return the three numbers of an attribute (3,)."""
     text = element.get(key, "0 0 0")
     try:
         values = np.array([float(word) for word in text.split()])

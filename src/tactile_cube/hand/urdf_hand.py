@@ -127,7 +127,7 @@ def _require_chain(tree: RigidBodyTree, joints: tuple[str, ...], where: str) -> 
 
 
 def _principal_axes(axis: Array, inertia: Array) -> Array:
-    """Axes (3, 3) of which z is `axis` (3,) and x, y are principal for `inertia` (3, 3) seen along it."""
+    """Return the axes (3, 3) of which z is `axis` (3,) and x, y are principal for `inertia` (3, 3) seen along it."""
     least = np.eye(3)[int(np.argmin(np.abs(axis)))]
     x = np.cross(least, axis)
     x /= np.linalg.norm(x)

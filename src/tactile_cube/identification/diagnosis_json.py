@@ -111,7 +111,7 @@ def _label(candidate: Candidate) -> list[str]:
 
 
 def names_of(explanation: Explanation) -> list[str]:
-    """NAME@JOINT of each effect."""
+    """Return NAME@JOINT of each effect."""
     return list(dict.fromkeys(name for candidate in explanation.effects for name in _label(candidate)))
 
 

@@ -117,7 +117,7 @@ def _shared(own: Array, place: int, others: Sequence[tuple[Array, int]], rows: i
 
 
 def _intervals(failing: NDArray[np.int64]) -> list[tuple[int, int]]:
-    """First and last segments of the failing intervals; one segment between two failing ones belongs to them."""
+    """Return first and last segments of the failing intervals; one segment between two failing ones belongs to them."""
     if not len(failing):
         return []
     edges = np.flatnonzero(np.diff(failing) > 2)
@@ -188,7 +188,7 @@ def _late_beside_effects(
 
 
 def _beside_an_effect(recording: Recording, effects: Sequence[type[Effect]], known: ModelFile | None) -> float:
-    """Error of the base model with the one effect that explains most [sensor noise]."""
+    """Return the error of the base model with the one effect that explains most [sensor noise]."""
     noise = noise_with_links(recording)
     search = Search(recording, recording, noise, effects, lambda line: None, known, segments=SEGMENTS)
     looks = look(search, Proposal((), search.base.fit), recording.joints)

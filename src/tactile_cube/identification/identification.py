@@ -138,7 +138,7 @@ def divided(
 
 
 def _wanted(text: str, joints: Sequence[str]) -> list[tuple[type[Effect], str, tuple[str, ...]]]:
-    """Effects, joints and the parameters that were named in brackets behind the effect or the joint."""
+    """Return the effects, joints and the parameters that were named in brackets behind the effect or the joint."""
     found = re.search(r"\(([^()]*)\)", text)
     names = tuple(filter(None, (name.strip() for name in found.group(1).split(",")))) if found else ()
     placed = resolve([text.replace(found.group(), "") if found else text], joints)

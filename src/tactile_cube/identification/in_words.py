@@ -72,7 +72,7 @@ def answer(result: dict[str, Any], experiment: Experiment | None, constants: Seq
 
 
 def restated(recording: Recording, model: ModelFile) -> list[str]:
-    """Constants whose interval leaves out what the owner states, and which are far from it."""
+    """Return the constants whose interval leaves out what the owner states, and which are far from it."""
     lines = []
     for key, joint, one in ((key, joint, one) for key, row in model.values.items() for joint, one in row.items()):
         stated = recording.stated(key, joint)
@@ -154,7 +154,7 @@ def _unexplained(entry: dict[str, Any], units: Mapping[str, str]) -> str:
 
 
 def unproven_effects(entries: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Effects of which one may be the missing one, and what to do about it."""
+    """Return the effects of which one may be the missing one, and what to do about it."""
     lines = [
         f"{' & '.join(one['effects'])} would reduce the held-out squared error by {100 * one['heldout_gain']:.0f} % "
         f"(p {one['p_value']:.2g})"
@@ -254,7 +254,7 @@ def proposal(experiment: Experiment) -> list[str]:
 
 
 def joint_rows(experiment: Experiment, units: Mapping[str, str]) -> list[tuple[str, ...]]:
-    """Joint; furthest position, speed and torque in any model; the same of what is allowed, with who says so."""
+    """Return joint; furthest position, speed and torque in any model; the same of what is allowed, with who says so."""
     safety, rows = experiment.safety, list[tuple[str, ...]]()
     for j, joint in enumerate(experiment.joints if experiment.decides or not safety.safe else ()):
         unit = units.get(joint, TURNS)

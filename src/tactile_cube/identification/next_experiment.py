@@ -61,7 +61,7 @@ class Experiment:
         return self.told > 1.0 and self.safety.safe
 
     def write(self, folder: Path) -> Path:
-        """next_experiment.csv: time and the commands, in the columns of a recording."""
+        """Write next_experiment.csv: time and the commands, in the columns of a recording."""
         columns = {"time": self.time}
         columns |= {f"{name}.command": self.commands[:, j] for j, name in enumerate(self.joints)}
         path = folder / FILE

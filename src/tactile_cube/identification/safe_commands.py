@@ -137,7 +137,7 @@ DRIVEN = 0.9  # part of a command that drives, where commands are torques: then 
 
 
 def excitations(recording: Recording, seed: int, unit: float = 1.0) -> dict[str, Array]:
-    """Commands (T, n) of each kind, inside those of the recording and near their speed.
+    """Return the commands (T, n) of each kind, inside those of the recording and near their speed.
 
     Torques begin with a push away from the nearer end of the range and swing like a cosine, so that the way that they
     drive a free mass has an end; at last they rest, until friction has stopped it.
@@ -174,7 +174,7 @@ def middle_command(recording: Recording) -> Array:
 
 
 def _waves(time: Array, recording: Recording, rng: np.random.Generator) -> dict[str, Array]:
-    """Commands between -1 and 1 at times (T, 1) [s] of a finger."""
+    """Return the commands between -1 and 1 at times (T, 1) [s] of a finger."""
     joints = len(recording.joints)
     phases = rng.uniform(0.0, 2.0 * np.pi, joints)
     if recording.torque_controlled:
@@ -248,7 +248,7 @@ class PossibleMotions:
     """
 
     def __init__(self, shooting: Shooting, recording: Recording, fits: Sequence[Fit], margin: float) -> None:
-        """Simulates nothing yet; `margin` is the part of each stated limit that is kept free."""
+        """Simulate nothing yet; `margin` is the part of each stated limit that is kept free."""
         self.shooting, self.recording, self.margin = shooting, recording, margin
         zero, self.limits = no_offsets(recording), limits_of(recording)
         self.fits = [fit.model.with_offsets(zero) for fit in fits]
@@ -321,7 +321,7 @@ def trials_from_rest(recording: Recording, kind: str, commands: Array) -> list[T
 
 
 def interval_ends(fit: Fit) -> list[Model]:
-    """Models with each number at either end of its 95 % interval, the others refitted to that.
+    """Return the models with each number at either end of its 95 % interval, the others refitted to that.
 
     A number of one kind is at its end at all joints at once, so that a hand needs no more models than a joint.
     One of which the data say nothing stays as fitted: it has no end that could be tried.
@@ -339,7 +339,7 @@ def interval_ends(fit: Fit) -> list[Model]:
 
 
 def covariance_of_numbers(fit: Fit) -> tuple[Array, tuple[Unknown, ...]]:
-    """Covariance (P, P) in units of the scales of what was fitted beside joint offsets, and what that is."""
+    """Return the covariance (P, P) in units of the scales of what was fitted beside joint offsets, and what that is."""
     kept = [k for k, unknown in enumerate(fit.unknowns) if unknown.kind != "offset"]
     covariance = np.linalg.pinv(fit.information + np.diag(precision(fit.unknowns)))[np.ix_(kept, kept)]
     return np.asarray(covariance), tuple(fit.unknowns[k] for k in kept)

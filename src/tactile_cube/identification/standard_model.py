@@ -198,7 +198,7 @@ class _Fitting:
         return problem
 
     def needed(self, best: _Tried) -> _Tried:
-        """Without the effects that are as stated, then without those in proportion with a torque constant."""
+        """Remove the effects that are as stated, then those in proportion with a torque constant."""
         assert best.fit is not None, "what is stated has nothing to take out"
         best = self.without(best, needless(best, len(self.start.terms)))
         plain = {t.label for t in best.model.terms[len(self.start.terms) :] if t.effect.name in IN_PROPORTION}
@@ -242,7 +242,7 @@ class _Tried:
 
 
 def needless(tried: _Tried, first: int) -> set[str]:
-    """Effects from the term `first` on that are as stated, the least certain one of a joint taken out after another.
+    """Return the effects from the term `first` on that are as stated, the least certain of a joint taken out first.
 
     What the others become without it follows from the fit's covariance, as large as its intervals say (Wald's test).
     """
@@ -268,7 +268,7 @@ def needless(tried: _Tried, first: int) -> set[str]:
 
 
 def certainties(model: Model, found: Fit, half_width: Array) -> dict[int, float]:
-    """Index of a term -> how far its fitted numbers are from changing nothing, at most, in half widths (P,)."""
+    """Return index of a term -> how far its fitted numbers are from changing nothing, at most, in half widths (P,)."""
     sure: dict[int, float] = {}
     for u, width in zip(found.unknowns, half_width, strict=True):
         if u.kind == "effect":
@@ -292,7 +292,7 @@ def with_law(model: Model, effect: type[Effect], joint: str, parameters: tuple[s
 
 
 def soft_l1(error: Array, weight: Array) -> Array:
-    """Weights (G, R) of squared errors (G, R) in a soft-L1 loss, whose width follows most of the errors.
+    """Return the weights (G, R) of squared errors (G, R) in a soft-L1 loss, whose width follows most of the errors.
 
     Errors of no weight (G, R) count in nothing.
     Source: Huber, Robust Statistics, 1981; the loss is scipy.optimize.least_squares'.

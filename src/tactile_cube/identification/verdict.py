@@ -84,7 +84,7 @@ def find_rivals(
 
 
 def unexplained_joints(chosen: Explanation, joints: tuple[str, ...], criteria: Criteria = STANDARD) -> list[str]:
-    """Joints whose held-out error stays above what is tolerated."""
+    """Return the joints whose held-out error stays above what is tolerated."""
     errors = chosen.judgement.joint_errors
     return [joint for joint, error in zip(joints, errors, strict=True) if error > criteria.tolerated]
 

@@ -30,7 +30,7 @@ def safe_range(joint: RigJoint, share: float) -> tuple[float, float]:
 
 
 def excitation(kind: str, low: Array, high: Array, duration: float, rate: float, rng: np.random.Generator) -> Array:
-    """Commands of one trial (duration * rate, joints) [rad], within `low` and `high` (joints,); see `KINDS`."""
+    """Return commands of one trial (duration * rate, joints) [rad], within `low` and `high` (joints,); see `KINDS`."""
     if kind not in KINDS:
         raise InputError(f"kinds: '{kind}' is no excitation; known: {list(KINDS)}")
     time = np.arange(round(duration * rate)) / rate
@@ -50,7 +50,7 @@ def ramps(time: Array, rng: np.random.Generator) -> Array:
 
 
 def holds(time: Array, rng: np.random.Generator) -> Array:
-    """Quick moves between configurations that are held for a second or so, in 0..1: gravity, sticking, creep."""
+    """Return quick moves between configurations that are held for a second or so, in 0..1: gravity, sticking, creep."""
     return _held(time, (0.6, 1.4), 0.15, rng)
 
 
@@ -60,7 +60,7 @@ def steps(time: Array, rng: np.random.Generator) -> Array:
 
 
 def _held(time: Array, rest: tuple[float, float], move: float, rng: np.random.Generator) -> Array:
-    """Random values that are each held for some `rest` [s] and reached within `move` [s]."""
+    """Return random values that are each held for some `rest` [s] and reached within `move` [s]."""
     corners, values = [0.0], [float(rng.uniform())]
     while corners[-1] < time[-1]:
         end = corners[-1] + rng.uniform(*rest)
@@ -77,7 +77,7 @@ def multisine(time: Array, rng: np.random.Generator) -> Array:
 
 
 def policy(time: Array, rng: np.random.Generator) -> Array:
-    """New targets at 10 Hz behind a low-pass, in 0..1: what a learning policy does to the hand."""
+    """Return the new targets at 10 Hz behind a low-pass, in 0..1: what a learning policy does to the hand."""
     walk = np.cumsum(rng.normal(0, 0.25, int(np.ceil(time[-1] / POLICY_PERIOD)) + 2)) + rng.uniform()
     folded = np.abs((walk + 1) % 2 - 1)
     targets = folded[np.floor(time / POLICY_PERIOD + 1e-9).astype(int)]
@@ -107,7 +107,7 @@ BenchTrial = tuple[TrialEntry, Array]
 
 
 def touch_offsets(recording: Recording, model: ModelFile) -> dict[str, Estimate]:
-    """Joint -> mean offset [rad] that its touches show, with the range that the initialisations span.
+    """Return joint -> mean offset [rad] that its touches show, with the range that the initialisations span.
 
     The offset is measured less true angle, without the drive's deflection by the stiffness in `model` or as stated.
     """
@@ -126,7 +126,7 @@ def touch_offsets(recording: Recording, model: ModelFile) -> dict[str, Estimate]
 
 
 def _torque(trial: Trial) -> Array:
-    """Measured torque, or the one that the controller must have asked for, (n, joints) [N m]."""
+    """Return the measured torque, or the one that the controller must have asked for, (n, joints) [N m]."""
     if trial.torque is not None:
         return trial.torque
     asked = trial.gains.kp * (trial.command - trial.position) - trial.gains.kd * trial.velocity()
@@ -164,13 +164,13 @@ def with_object(recording: Recording) -> Recording:
 def bench_trials(
     rig: Recording, kinds: Iterable[str], initialisations: int, rng: np.random.Generator
 ) -> list[BenchTrial]:
-    """Entries and commands (n, joints) [rad] of the bench tests among `kinds`, for every initialisation."""
+    """Return the entries and commands (n, joints) [rad] of the bench tests among `kinds`, for every initialisation."""
     chosen = [BENCH_KINDS[kind] for kind in kinds if kind in BENCH_KINDS]
     return [trial for number in range(initialisations) for test in chosen for trial in test(rig, number, rng)]
 
 
 def _configuration(rig: Recording, rng: np.random.Generator) -> Array:
-    """Angles (joints,) [rad] in the middle half of every joint's range."""
+    """Return the angles (joints,) [rad] in the middle half of every joint's range."""
     low, high = np.array([safe_range(rig.rig.joints[joint], 0.5) for joint in rig.joints]).T
     return np.asarray(rng.uniform(low, high))
 
@@ -198,7 +198,7 @@ def _known_force(rig: Recording, number: int, rng: np.random.Generator) -> list[
 
 
 def _clamped(rig: Recording, number: int, rng: np.random.Generator) -> list[BenchTrial]:
-    """Links held still while every command sweeps about the configuration: the drive alone gives way."""
+    """Return the links held still while every command sweeps about the configuration: the drive alone gives way."""
     sweep = SWEEP * np.sin(2 * np.pi * _time(rig, SWEEP_TIME) / SWEEP_TIME)
     file = f"trials/clamped_{number}.parquet"
     entry = TrialEntry(file=file, initialisation=number, kind="clamped", clamped=True)

@@ -86,7 +86,7 @@ def _torques(recording: Recording, window: float) -> list[Array]:
 
 
 def _moved_masses(tree: RigidBodyTree) -> Array:
-    """Mass (n,) of all links beyond each actuated joint [kg]."""
+    """Return the mass (n,) of all links beyond each actuated joint [kg]."""
     beyond = tree.mass.copy()
     for link in range(tree.dofs - 1, -1, -1):
         if tree.parent[link] >= 0:

@@ -25,7 +25,7 @@ def milli(value: float, unit: str = TURNS, digits: int = 3) -> str:
 
 
 def short(value: float, digits: int = 3) -> str:
-    """Significant digits, no powers of ten below a million: 0.0471, 12.3, 382."""
+    """Return the significant digits, no powers of ten below a million: 0.0471, 12.3, 382."""
     whole = 10**digits * 0.9995 / 10 <= abs(value) < MILLION
     return f"{value:.0f}" if whole else f"{value:.{digits}g}"
 
@@ -52,5 +52,5 @@ def shown(label: str, unit: str) -> tuple[str, float]:
 
 
 def named(signal: str, units: Mapping[str, str]) -> tuple[str, float]:
-    """`shown` of a signal that names its joint, such as `velocity of elbow [rad/s]`."""
+    """Return `shown` of a signal that names its joint, such as `velocity of elbow [rad/s]`."""
     return shown(signal, next((unit for joint, unit in units.items() if f" of {joint} [" in signal), TURNS))

@@ -31,7 +31,7 @@ class Distribution(Protocol):
 
 
 def sample(distribution: Distribution, rng: np.random.Generator, shape: tuple[int, ...] = ()) -> Array:
-    """Independent draws of `shape`."""
+    """Return independent draws of `shape`."""
     return distribution.quantile(rng.random(shape))
 
 
@@ -42,7 +42,7 @@ class Constant:
     value: float
 
     def quantile(self, u: Array) -> Array:
-        """`value` in the shape of `u`."""
+        """Return `value` in the shape of `u`."""
         return np.full(np.shape(u), self.value)
 
 
@@ -58,7 +58,7 @@ class Uniform:
             raise InputError(f"Uniform: low {self.low} is above high {self.high}; give low <= high")
 
     def quantile(self, u: Array) -> Array:
-        """Linear between the bounds."""
+        """Return the quantile, linear between the bounds."""
         return self.low + (self.high - self.low) * np.asarray(u)
 
 
@@ -74,7 +74,7 @@ class UniformPerJoint:
             raise InputError(f"UniformPerJoint: low {self.low} and high {self.high}; give low <= high for each joint")
 
     def quantile(self, u: Array) -> Array:
-        """Linear between the bounds; the last axis of `u` is the joints'."""
+        """Return the quantile, linear between the bounds; the last axis of `u` is the joints'."""
         low, high = np.asarray(self.low), np.asarray(self.high)
         return np.asarray(low + (high - low) * np.asarray(u))
 
@@ -107,7 +107,7 @@ class LogUniform:
             raise InputError(f"LogUniform: needs 0 < low <= high, got low {self.low}, high {self.high}")
 
     def quantile(self, u: Array) -> Array:
-        """Geometric between the bounds."""
+        """Return the quantile, geometric between the bounds."""
         return np.asarray(self.low * (self.high / self.low) ** np.asarray(u), dtype=np.float64)
 
 
@@ -314,7 +314,7 @@ def identified(
 def identified_contact(
     model: ModelFile, constants: EpisodeConstants, randomization: Randomization
 ) -> tuple[EpisodeConstants, Randomization]:
-    """Fingertips and object that were identified: values in place of nominal ones, intervals in place of ranges.
+    """Return fingertips and object that were identified: values in place of nominal ones, intervals in place of ranges.
 
     What a model says of an object is how it differs from what was stated of it; the same is put on the world's object.
     """
@@ -336,7 +336,7 @@ def identified_contact(
 
 
 def _on_joints(estimates: Mapping[str, Estimate], nominal: Array, joints: Sequence[str]) -> tuple[Array, Array, Array]:
-    """Low end, value and high end (joints,); nominal where nothing is stated."""
+    """Return the low end, value and high end (joints,); nominal where nothing is stated."""
     low, value, high = nominal.copy(), nominal.copy(), nominal.copy()
     for name, estimate in estimates.items():
         for joint in matching_joints(name, joints):

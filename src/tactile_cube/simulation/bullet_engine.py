@@ -55,7 +55,7 @@ def connect(options: SimulationOptions) -> int:
 
 
 def load_chain(client: int, urdf: str, position: Array, rotation: Array) -> int:
-    """Loads a robot with a fixed base and free joints: no motors, no damping. Gives its body id."""
+    """Load a robot with a fixed base and free joints: no motors, no damping. Return its body id."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "chain.urdf"
         file.write_text(urdf, encoding="utf-8")
@@ -71,7 +71,7 @@ def load_chain(client: int, urdf: str, position: Array, rotation: Array) -> int:
 
 
 def com_arm(constants: EpisodeConstants, quaternion: Array) -> Array:
-    """From the cube's centre to its centre of mass, in the world (3,) [m]."""
+    """Return the vector from the cube's centre to its centre of mass, in the world (3,) [m]."""
     com = np.asarray(constants.cube_com)
     return Rotation.from_quat(quaternion).as_matrix() @ com if com.any() else np.zeros(3)
 
@@ -280,7 +280,7 @@ class BulletEngine:
                 pybullet.changeDynamics(body, link, **numbers, **self._here)
 
     def _forget_contacts(self) -> None:
-        """Registers every finger anew with the broadphase; cube and table are new themselves.
+        """Register every finger anew with the broadphase; cube and table are new themselves.
 
         That drops cached contacts and their impulses, so an episode depends on nothing that happened before it.
         A finger meets everything but itself.
@@ -293,7 +293,7 @@ class BulletEngine:
 
 
 def _refuse_tilted_inertia(mesh: ObjectMesh, size: Array) -> None:
-    """Bullet knows an object's moments of inertia about its own axes alone."""
+    """Refuse a tilted inertia: Bullet knows an object's moments of inertia about its own axes alone."""
     inertia = mesh.inertia(size)
     tilted = float(np.abs(inertia - np.diag(np.diag(inertia))).max() / np.diag(inertia).min())
     if tilted > TILTED:

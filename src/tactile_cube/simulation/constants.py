@@ -175,7 +175,7 @@ class Start:
 
 
 def constants_of(hand: Hand | None = None, object: Mapping[str, Any] | None = None, **values: Any) -> EpisodeConstants:
-    """Constants of an episode with a hand and an object.
+    """Return the constants of an episode with a hand and an object.
 
     Args:
         hand: whose drives they are; None: the DLR-Hand II.

@@ -80,7 +80,7 @@ class Surface:
     compliance: float = 0.0
 
     def on(self, other: Surface) -> Surface:
-        """Both together."""
+        """Combine both."""
         return Surface(
             self.lateral * other.lateral,
             self.spinning * other.lateral + other.spinning * self.lateral,
@@ -143,7 +143,7 @@ class SimulationOptions:
         return self.engine
 
     def of_world(self, index: int) -> SimulationOptions:
-        """Options of one of several worlds side by side: with `mixed`, engines alternate."""
+        """Return the options of one of several worlds side by side: with `mixed`, engines alternate."""
         return replace(self, engine=_SINGLE[index % len(_SINGLE)]) if self.engine == "mixed" else self
 
     @property
@@ -178,20 +178,20 @@ class Engine(Protocol):
         """Set the world's gravity (3,) [m/s^2]."""
 
     def run(self, steps: int, wrench: Array | None, record: bool) -> Array | None:
-        """Runs physics steps: control, apply torques, step.
+        """Run physics steps: control, apply torques, step.
 
         A wrench (6,) [N, N m] acts on the cube's centre of mass in the world. With `record` it gives the cube's states
         before each step and after the last (steps + 1, 13).
         """
 
     def cube_state(self) -> Array:
-        """Pose and velocity of the cube's centre in the world (13,), see `OBJECT_STATE`."""
+        """Return the pose and velocity of the cube's centre in the world (13,), see `OBJECT_STATE`."""
 
     def gaps(self) -> list[float]:
-        """Gaps of the contact points of the last physics step [m], negative where bodies overlap."""
+        """Return the gaps of the contact points of the last physics step [m], negative where bodies overlap."""
 
     def contacts(self) -> list[Contact]:
-        """Contacts on the cube and between fingers in the last physics step."""
+        """Return the contacts on the cube and between fingers in the last physics step."""
 
     def normal_forces(self) -> Array:
         """Sums of the normal forces on the object of each finger's other links and of its tip (2, fingers) [N]."""
@@ -225,7 +225,7 @@ class HandDrive:
         self.memory = self.plant.memory(DrivetrainConstants(), effects=self._effects)
 
     def finger_urdfs(self) -> list[str]:
-        """URDF text of each finger, with the masses that effects on the mechanism have changed."""
+        """Return the URDF text of each finger, with the masses that effects on the mechanism have changed."""
         mass, com, inertia = (self.view(key) for key in ("mass", "com", "inertia"))
         texts = []
         for k, (text, tree) in enumerate(zip(self._urdfs, self._trees, strict=True)):
@@ -235,7 +235,7 @@ class HandDrive:
         return texts
 
     def reset(self, c: EpisodeConstants, start: Start) -> None:
-        """Fills the memory for an episode and puts it at rest at the start.
+        """Fill the memory for an episode and put it at rest at the start.
 
         Raises:
             InputError: The torque loop would be unstable with these constants and this time step.
@@ -259,7 +259,7 @@ class HandDrive:
             self.view(key)[:] = start.angles if start.target is None else start.target - c.joint_offset
 
     def view(self, key: str) -> Array:
-        """Writable numbers of the memory."""
+        """Return writable numbers of the memory."""
         return self.plant.view(self.memory, key)
 
     def signal(self, row: int) -> Array:
@@ -267,17 +267,17 @@ class HandDrive:
         return self.plant.signal(self.memory, row)
 
     def set_engine_gravity(self, acceleration: Array) -> None:
-        """Tells the control step what gravity the engine applies (3,) [m/s^2]; the fingers keep feeling their own."""
+        """Tell the control step what gravity the engine applies (3,) [m/s^2]; the fingers keep feeling their own."""
         self.view("engine_gravity")[:] = self._in_bases(acceleration)
 
     def sense(self, q: Array, v: Array) -> None:
-        """Computes what the sensors read at rest at q, v (all joints,), without changing any state."""
+        """Compute what the sensors read at rest at q, v (all joints,), without changing any state."""
         trial = self.memory.copy()
         self.plant.kernel.control_step(0, q.copy(), v.copy(), np.zeros_like(q), trial)
         self.view("signals")[:] = self.plant.view(trial, "signals")
 
     def _refuse_unstable(self, c: DrivetrainConstants) -> None:
-        """Raises InputError if a finger with the largest damping and smallest inertia of each joint would diverge."""
+        """Raise InputError if a finger with the largest damping and smallest inertia of each joint would diverge."""
         of_fingers = {
             name: np.reshape(getattr(c, name), (-1, self._hand.joints_per_finger))
             for name in ("kp", "kd", "stiffness", "reflected_inertia")
@@ -302,7 +302,7 @@ PARALLEL = 0.99  # cosine of the angle between axes from which on they count as 
 
 
 def spin_inertia(hand: Hand, shares: Array, reflected_inertia: Array) -> Array:
-    """Spin inertia of each link about its joint (fingers, links), from I_a of the joints (joints,) [kg m^2]."""
+    """Return spin inertia of each link about its joint (fingers, links), from I_a of the joints (joints,) [kg m^2]."""
     return np.asarray(np.maximum(hand.all_angles(reflected_inertia), LEAST_INERTIA) * shares)
 
 

@@ -40,7 +40,7 @@ def find_fault(q: Array, v: Array, cube: Array, distances: Sequence[float], coup
 
 @compiled_once
 def _extremes(q: Array, v: Array, cube: Array, coupled: NDArray[np.int64]) -> tuple[float, float, float, float]:
-    """Largest joint speed, cube speed, cube spin and tendon stretch; infinite where a number is none."""
+    """Return the largest joint speed, cube speed, cube spin and tendon stretch; infinite where a number is none."""
     speed = stretch = linear = angular = 0.0
     for finger in range(q.shape[0]):
         for pair in range(coupled.shape[0]):

@@ -126,7 +126,7 @@ class HandSpec:
         body.add_geom(name=name, type=kind, size=numbers, pos=shape.position, contype=0, conaffinity=0, **more)
 
     def _set_links(self) -> None:
-        """Masses and rotors of the links; effects may have changed them for this episode."""
+        """Set masses and rotors of the links; effects may have changed them for this episode."""
         view = self._drive.view
         for k, finger in enumerate(self._links):
             for i, (body, joint) in enumerate(finger):
@@ -172,12 +172,12 @@ def _geometry(kind: NamedShape, half: Array) -> tuple[Any, Array]:
 
 
 def _wxyz(rotation: Array) -> Array:
-    """MuJoCo's quaternion of a rotation matrix."""
+    """Return MuJoCo's quaternion of a rotation matrix."""
     return np.asarray(Rotation.from_matrix(rotation).as_quat())[[3, 0, 1, 2]]
 
 
 def _six(inertia: Array) -> list[float]:
-    """Ixx, Iyy, Izz, Ixy, Ixz, Iyz."""
+    """Return Ixx, Iyy, Izz, Ixy, Ixz, Iyz."""
     return [float(inertia[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
 
 
@@ -275,7 +275,7 @@ class MujocoEngine:
         return force
 
     def close(self) -> None:
-        """Nothing to end: MuJoCo has no server."""
+        """End nothing: MuJoCo has no server."""
 
     def _names(self, shape: int) -> tuple[str, str]:
         """Return the body (finger, `cube` or `table`) and link of a geom."""

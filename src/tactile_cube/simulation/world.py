@@ -100,11 +100,11 @@ class World:
         self._drive.set_engine_gravity(acceleration)
 
     def push_cube(self, force: Array, torque: Array) -> None:
-        """Pushes the cube's centre of mass with force [N] and torque [N m] in the world until changed or reset."""
+        """Push the cube's centre of mass with force [N] and torque [N m] in the world until changed or reset."""
         self._push[:] = np.concatenate([force, torque])
 
     def pull_finger(self, finger: int, force: Array) -> None:
-        """Pulls a fingertip with a force (3,) [N] in the world until changed or reset."""
+        """Pull a fingertip with a force (3,) [N] in the world until changed or reset."""
         columns, q, width = [], self.q, 1e-6  # of the tip's velocity per joint velocity, by central differences
         for joint in range(q.size)[self.hand.of_finger(finger)]:
             delta = np.where(np.arange(q.size) == joint, width, 0.0)
@@ -189,7 +189,7 @@ class World:
         return self.steps * self.options.policy_dt
 
     def contacts(self) -> list[Contact]:
-        """Contacts of the last physics step."""
+        """Return the contacts of the last physics step."""
         return self._engine.contacts()
 
     def normal_forces(self) -> Array:

@@ -119,7 +119,7 @@ class SingleCollection:
         return self._block
 
     def cpu_seconds(self) -> float:
-        """CPU time spent simulating so far [s]."""
+        """Return the CPU time spent simulating so far [s]."""
         return self._cpu
 
     def close(self) -> None:
@@ -210,7 +210,7 @@ class MultiSyncCollection:
         return block
 
     def cpu_seconds(self) -> float:
-        """CPU time of all workers since they started [s]; 0 where the system does not tell."""
+        """Return the CPU time of all workers since they started [s]; 0 where the system does not tell."""
         return sum(map(_cpu_seconds, self._processes)) if self._final_cpu is None else self._final_cpu
 
     def close(self) -> None:
@@ -350,7 +350,7 @@ def prepare_worker(parent: int | None) -> None:
 
 
 def _cpu_seconds(process: Any) -> float:
-    """User and system time of a running process [s], from /proc; 0 for one that is closed already."""
+    """Return the user and system time of a running process [s], from /proc; 0 for one that is closed already."""
     try:
         fields = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()
     except (OSError, ValueError):

@@ -20,7 +20,7 @@ class Costs:
     wall: float = 0.0
 
     def __add__(self, other: "Costs") -> "Costs":
-        """Spent together."""
+        """Return what both spent together."""
         return Costs(self.simulating + other.simulating, self.learning + other.learning, self.wall + other.wall)
 
 
@@ -39,7 +39,7 @@ class Ledger:
         self._wall, self._cpu = time.perf_counter(), time.process_time()
 
     def costs(self) -> Costs:
-        """Spent by this run until now."""
+        """Return what this run spent until now."""
         simulating = self._simulating()
         learning = time.process_time() - self._cpu - (simulating if self._in_process else 0.0)
         return self.before + Costs(simulating, learning, time.perf_counter() - self._wall)
@@ -57,7 +57,7 @@ def write_costs(path: Path, steps: int, costs: Costs) -> None:
 
 
 def read_costs(path: Path) -> Costs:
-    """Spent according to a ledger; nothing where there is none."""
+    """Return what was spent according to a ledger; nothing where there is none."""
     try:
         return Costs(**json.loads(path.read_text())["seconds"])
     except (OSError, ValueError, KeyError, TypeError):

@@ -144,7 +144,7 @@ def _rows_until(steps: int, path: Path) -> list[list[str]]:
 def open_logger(
     folder: Path, resumed_at: int, config: Mapping[str, Any], backend: str | None = None, project: str = "tactile_cube"
 ) -> Logger | None:
-    """TorchRL's logger of a backend, in the run folder; None without one.
+    """Return TorchRL's logger of a backend, in the run folder; None without one.
 
     In Weights & Biases a folder is a run of its own, grouped by the training or sweep it is part of; one that goes on
     writes into its own again, one that starts over begins it anew.

@@ -46,7 +46,7 @@ class Learner:
     metrics: dict[str, Tensor] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Nothing waits for its future yet."""
+        """Start without a future to wait for."""
         self.assembler = TransitionAssembler(self.agent.settings.n_step, self.agent.settings.gamma)
 
     def run_to_barrier(self, after_iteration: Callable[[], None]) -> None:
@@ -102,7 +102,7 @@ class Learner:
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Inverse of `state_dict`."""
+        """Restore what `state_dict` returned."""
         self.agent.load_state_dict(state["agent"])
         self.replay.load_state_dict(state["replay"])
         self.episodes.load_state_dict(state["episodes"])

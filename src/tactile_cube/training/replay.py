@@ -66,7 +66,7 @@ class Replay:
         self.buffer = make(storage=LazyTensorStorage(capacity), generator=self.generator)
 
     def __len__(self) -> int:
-        """Transitions held now."""
+        """Return the transitions held now."""
         return len(self.buffer)
 
     def extend(self, transitions: Mapping[NestedKey, Tensor] | TensorDictBase) -> None:
@@ -97,7 +97,7 @@ class Replay:
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Inverse of `state_dict`, for a ring of the same capacity and widths."""
+        """Restore what `state_dict` returned, for a ring of the same capacity and widths."""
         written, parts = state["written"], state["transitions"]
         wanted = [(min(written, self.capacity), width) for width in self.widths.values()]
         if (found := [tuple(part.shape) for part in parts]) != wanted:

@@ -89,7 +89,7 @@ class EpisodeStatistics:
         return {**windows, "episodes": self.episodes, "faulty": self.faulty, "lost": self.worlds.lost.tolist()}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Inverse of `state_dict`."""
+        """Restore what `state_dict` returned."""
         for name in WINDOWS:
             setattr(self, name, deque(state.get(name, ()), maxlen=WINDOW))
         self.episodes, self.faulty = state["episodes"], state["faulty"]
@@ -114,7 +114,7 @@ class TransitionAssembler:
         self.pending: TensorDictBase | None = None
 
     def add(self, block: TensorDictBase) -> TensorDictBase:
-        """Transitions (rows,) that the block completes."""
+        """Return the transitions (rows,) that the block completes."""
         following = block["next"]
         fields = {
             "observation": block["observation"],
@@ -138,7 +138,7 @@ class TransitionAssembler:
         return self._sum(stream, stream.shape[1])
 
     def _sum(self, stream: TensorDictBase, count: int) -> TensorDictBase:
-        """n-step transitions that start at the first `count` times of the stream."""
+        """Return the n-step transitions that start at the first `count` times of the stream."""
         if not count:
             return stream[:, :0].flatten()
         stream, faulty = stream.clone(), stream["next", "faulty"]

@@ -44,7 +44,7 @@ class Trial:
     config: EnvConfig
 
     def __call__(self, actor: Actor, episodes: int, film: Path) -> dict[str, float]:
-        """`SCORE`, and what is `measured` by `<engine>_<name>`; films the first episode."""
+        """Return `SCORE`, and what is `measured` by `<engine>_<name>`; film the first episode."""
         result: dict[str, float] = {}
         scores = list[float]()
         protocol, policy = Protocol("trial", episodes=episodes, trace=False), ActorPolicy(actor)

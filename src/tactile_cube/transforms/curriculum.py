@@ -41,7 +41,7 @@ class Ramps:
     penalty_scale: float = 1.0
 
     def __post_init__(self) -> None:
-        """Refuses values without a meaning."""
+        """Refuse values without a meaning."""
         if self.by not in ("steps", "angle", None):
             raise InputError(f"curriculum.by is {self.by!r}; give steps, angle or null")
         if not self.low < self.high:
@@ -54,7 +54,7 @@ class Ramps:
                 raise InputError(f"curriculum.{key} is {value}; give a scale >= 0")
 
     def conditions(self, steps: int, angle: float, final: Conditions) -> Conditions:
-        """Conditions after `steps` with mean final `angle` [rad] on the way to `final`."""
+        """Return the conditions after `steps` with mean final `angle` [rad] on the way to `final`."""
         if self.by is None:
             return final
         progress = ((steps if self.by == "steps" else angle) - self.low) / (self.high - self.low)
@@ -82,7 +82,7 @@ class Curriculum(Transform):  # type: ignore[misc]
     """
 
     def __init__(self, ramps: Ramps | None = None) -> None:
-        """Follows `ramps`; None: the task's own conditions throughout."""
+        """Follow `ramps`; None: the task's own conditions throughout."""
         super().__init__()
         self.ramps = ramps or Ramps(by=None)
         self._now: tuple[int, float, NDArray[np.float64] | None] = (0, 0.0, None)

@@ -43,7 +43,7 @@ class JointOffset(Transform):  # type: ignore[misc]
         in_keys: Sequence[NestedKey] = ("joint_position",),
         in_keys_inv: Sequence[NestedKey] = ("action",),
     ) -> None:
-        """Draws each joint's offset from `distribution` [rad]; an action of 1 means `half_range` (joints,) [rad].
+        """Draw each joint's offset from `distribution` [rad]; an action of 1 means `half_range` (joints,) [rad].
 
         Args:
             distribution: of the offsets.
@@ -83,7 +83,7 @@ class SensorNoise(Transform):  # type: ignore[misc]
         in_keys: Sequence[NestedKey] = ("joint_position",),
         opposite: Sequence[NestedKey] = ("control_error",),
     ) -> None:
-        """Noise of standard deviation `std` [rad] on each of `in_keys`; `opposite` are computed from the first."""
+        """Add noise of standard deviation `std` [rad] on each of `in_keys`; `opposite` are computed from the first."""
         super().__init__(in_keys=in_keys, out_keys=in_keys)
         self.std, self.opposite = std, tuple(opposite)
 
@@ -110,7 +110,7 @@ class StickyAction(Transform):  # type: ignore[misc]
     """
 
     def __init__(self, probability: float, in_keys_inv: Sequence[NestedKey] = ("action",)) -> None:
-        """Repeats the action of the one given key with `probability` at each step, independently in each world.
+        """Repeat the action of the one given key with `probability` at each step, independently in each world.
 
         Raises:
             ValueError: several keys.

@@ -53,7 +53,7 @@ class Exploration:
     gaits: GaitRanges | None = None
 
     def __post_init__(self) -> None:
-        """Refuses values without a meaning."""
+        """Refuse values without a meaning."""
         for key in ("episodes", "probability", "demonstrations"):
             if not 0.0 <= getattr(self, key) <= 1.0:
                 raise InputError(f"exploration.{key} is {getattr(self, key)}; give a number in [0, 1]")
@@ -93,7 +93,7 @@ class FingerExploration(Transform):  # type: ignore[misc]
         fingers: int = 4,
         joints_per_finger: int = 3,
     ) -> None:
-        """Explores as `exploration` says; demonstrations play `gaits`, actions (gaits, steps, joints)."""
+        """Return the explore as `exploration` says; demonstrations play `gaits`, actions (gaits, steps, joints)."""
         super().__init__(out_keys=["exploring", "demonstrated", "action_taken"])
         self.settings = exploration
         self._groups, self._per_finger = finger_groups(fingers, exploration.single), joints_per_finger
@@ -133,7 +133,7 @@ class FingerExploration(Transform):  # type: ignore[misc]
         return tensordict.set("action", state["taken"])
 
     def _begin(self, worlds: torch.Size) -> None:
-        """Lets exploring worlds that hold nothing begin to hold, with the probability of a step."""
+        """Let exploring worlds that hold nothing begin to hold, with the probability of a step."""
         state, settings = self._state, self.settings
         begins = (torch.rand(*worlds, 1) < settings.probability) & state["exploring"] & (state["held"] == 0)
         steps = torch.randint(settings.shortest, settings.longest + 1, (*worlds, 1))
@@ -148,7 +148,7 @@ class FingerExploration(Transform):  # type: ignore[misc]
         return next_tensordict.set("action_taken", self._state["taken"])
 
     def transform_observation_spec(self, observation_spec: Composite) -> Composite:
-        """Adds the three keys."""
+        """Add the three keys."""
         worlds = observation_spec.shape
         observation_spec["exploring"] = Categorical(2, shape=(*worlds, 1), dtype=torch.bool)
         observation_spec["demonstrated"] = Categorical(2, shape=(*worlds, 1), dtype=torch.bool)

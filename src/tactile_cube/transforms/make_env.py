@@ -109,7 +109,7 @@ class EnvConfig:
     hand: Hand = DLR_HAND2
 
     def __post_init__(self) -> None:
-        """Makes the effects, puts the model in place, and refuses values without a meaning."""
+        """Make the effects, put the model in place, and refuse values without a meaning."""
         object.__setattr__(self, "hand", self.hand or DLR_HAND2)  # null in the configuration
         for key, kinds in PARTS.items():
             if not isinstance(getattr(self, key), kinds):
@@ -148,7 +148,7 @@ class EnvConfig:
 
 
 def make_env(config: EnvConfig, worlds: int, seed: int, evaluation: bool = False) -> TransformedEnv:
-    """Environment with batch size [worlds] and the keys "observation", "privileged" and "action".
+    """Build the environment with batch size [worlds] and the keys "observation", "privileged" and "action".
 
     For a hand with 12 joints and a stack of 5 they have 120, 25 and 12 numbers.
 
@@ -208,7 +208,7 @@ def transforms(config: EnvConfig, explore: bool) -> list[Transform]:
 
 
 def _demonstrated_gaits(config: EnvConfig) -> torch.Tensor | None:
-    """Actions (gaits, steps, joints) of whole episodes; None without demonstrations."""
+    """Return the actions (gaits, steps, joints) of whole episodes; None without demonstrations."""
     if config.exploration.demonstrations == 0.0:
         return None
     if config.exploration.gaits is None:

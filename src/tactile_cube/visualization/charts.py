@@ -49,14 +49,14 @@ class Interval:
 
 @matplotlib.rc_context(STYLE)
 def empty_chart(height: float, left: float = 62, right: float = 14, top: float = 26, bottom: float = 40) -> Axes:
-    """Axes to draw in, with margins [px] of a picture that is `WIDTH` wide."""
+    """Return the axes to draw in, with margins [px] of a picture that is `WIDTH` wide."""
     figure = Figure(figsize=(WIDTH / 72, height / 72))  # a point of 1/72 inch is a pixel of the page
     return figure.add_axes((left / WIDTH, bottom / height, 1 - (left + right) / WIDTH, 1 - (top + bottom) / height))
 
 
 @matplotlib.rc_context(STYLE)
 def time_chart(label: str, height: float = 240, x_label: str = "time [s]") -> Axes:
-    """Axes for curves over one x axis, time by default."""
+    """Return the axes for curves over one x axis, time by default."""
     axes = empty_chart(height)
     axes.set(xlabel=x_label, ylabel=label)
     for axis in (axes.xaxis, axes.yaxis):
@@ -80,7 +80,7 @@ def svg(axes: Axes) -> str:
 
 @matplotlib.rc_context(STYLE)
 def bar_chart(bars: Sequence[tuple[str, float]], unit: str, floor: float | None = None) -> str:
-    """Horizontal bars with their numbers; a dashed line marks the noise floor."""
+    """Draw horizontal bars with their numbers; a dashed line marks the noise floor."""
     axes = empty_chart(ROW * len(bars) + 34, left=230, right=110, top=4, bottom=30)
     names, values = [name for name, _ in bars], [value for _, value in bars]
     drawn = axes.barh(range(len(bars)), values, 0.7, color=SIMULATED)
@@ -97,7 +97,7 @@ def bar_chart(bars: Sequence[tuple[str, float]], unit: str, floor: float | None 
 
 @matplotlib.rc_context(STYLE)
 def heat_map(rows: Sequence[str], columns: Sequence[str], values: Sequence[Sequence[float | None]]) -> str:
-    """Ratios on a background that reddens with their logarithm, from 1 to the largest or 6; None stays empty."""
+    """Draw ratios on a background that reddens with their logarithm, from 1 to the largest or 6; None stays empty."""
     width = min(74, (WIDTH - 180) / max(1, len(columns)))
     height = 150 + ROW * len(rows) + 8
     axes = empty_chart(height, left=90, right=WIDTH - 90 - width * len(columns), top=150, bottom=8)
@@ -138,7 +138,7 @@ def interval_chart(intervals: Sequence[Interval]) -> str:
 
 
 def overlay(comparison: Comparison, trial: int, joint: int, before: Comparison | None = None) -> str:
-    """Command, measured and simulated angle of one joint in one trial, failing intervals marked.
+    """Draw command, measured and simulated angle of one joint in one trial, failing intervals marked.
 
     With `before`, the comparison of the model as it was, its simulation is drawn too.
     """
@@ -190,7 +190,7 @@ def band(comparison: Comparison, trial: int, joint: int) -> str:
 
 
 def _difference_chart(comparison: Comparison, joint: int, height: int) -> tuple[Axes, float]:
-    """Axes of a joint's errors, and how many of their unit make a rad or m."""
+    """Return the axes of a joint's errors, and how many of their unit make a rad or m."""
     name = comparison.recording.joints[joint]
     unit, size = SMALL[comparison.recording.shown[name]]
     return time_chart(f"{name} [{unit}]", height), size
@@ -202,7 +202,7 @@ def _shade(axes: Axes, comparison: Comparison, trial: int, joint: int) -> None:
 
 
 def regime_map(comparison: Comparison) -> str:
-    """Error / noise floor of every joint in every regime; of many kinds of trial only the worst."""
+    """Draw error / noise floor of every joint in every regime; of many kinds of trial only the worst."""
     worst_first = sorted((one for one in comparison.regimes if one.dimension == "kind"), key=lambda one: -one.error)
     kinds = list(dict.fromkeys(one.regime for one in worst_first))[:MOST_KINDS]
     names = list(dict.fromkeys((one.dimension, one.regime) for one in comparison.regimes))

@@ -42,7 +42,7 @@ def write_comparison(comparison: Comparison, path: Path) -> None:
 
 
 def trial_starts(comparison: Comparison) -> list[float]:
-    """When each trial begins on the common time line [s]."""
+    """Return when each trial begins on the common time line [s]."""
     lengths = [trial.duration + PAUSE for trial in comparison.recording.trials]
     return [float(start) for start in np.concatenate([[0.0], np.cumsum(lengths)[:-1]])]
 

@@ -130,7 +130,7 @@ def error_section(comparison: Comparison) -> Section:
 
 
 def where_section(comparison: Comparison, title: str = "Where it fails") -> Section:
-    """In words, and as a map of joints and regimes."""
+    """Say in words, and as a map, in which joints and regimes the error lies."""
     caption = (
         "Error / noise floor of each joint in each regime: 1 is noise, red is where the model fails. An outlier in a "
         "row hints at what is missing. Friction shows just after reversals and at low speed, delay and inertia at high "
@@ -142,7 +142,7 @@ def where_section(comparison: Comparison, title: str = "Where it fails") -> Sect
 def overlay_section(
     comparison: Comparison, title: str = "Measured and simulated", before: Comparison | None = None
 ) -> Section:
-    """Measured over simulated, the worst trial of each joint; with `before`, the model as it was is drawn too."""
+    """Draw measured over simulated, the worst trial of each joint; with `before`, the model as it was is drawn too."""
     worst = before or comparison
     blocks = []
     order = sorted(worst.errors.joints, key=lambda j: -worst.errors.joints[j] / worst.floor.joints[j])

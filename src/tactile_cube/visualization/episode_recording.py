@@ -219,7 +219,7 @@ def _joint_lines(branch: Branch, entity: str, time: Array, values: Array, colour
 
 
 def _cycled(colours: Colours, places: Sequence[int]) -> Colours:
-    """Colours go round where there are more joints or fingers than colours."""
+    """Repeat the colours where there are more joints or fingers than colours."""
     return [colours[place % len(colours)] for place in places]
 
 

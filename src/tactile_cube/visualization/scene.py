@@ -84,7 +84,7 @@ def object_parts(size: Array, shape: ObjectShape = "box") -> list[Part]:
 
 
 def _normals(corners: Array) -> Array:
-    """Directions in which triangles `(n, 3, 3)` look `(n, 3)`."""
+    """Return the directions in which triangles `(n, 3, 3)` look `(n, 3)`."""
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     return np.asarray(normals / np.linalg.norm(normals, axis=1, keepdims=True))
 

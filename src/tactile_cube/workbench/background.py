@@ -72,7 +72,7 @@ class Diagnosing:
         return f"about {100 * self.share:.0f} % done in {taken:.0f} s{left}"
 
     def lines(self) -> Iterator[str]:
-        """Progress, line by line, until it ends; nothing is said for a while: an empty line.
+        """Yield the progress, line by line, until it ends; an empty line where nothing is said for a while.
 
         Raises:
             InputError: what `diagnose` raises, or the process died.

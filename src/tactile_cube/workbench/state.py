@@ -357,7 +357,7 @@ class Workbench:
         return ModelStage(label, fit, model, judgement, over_noise, errors, half_width, final)
 
     def _tested(self, model: Model) -> tuple[ErrorSummary, float]:
-        """Errors of free runs of the untouched trials [rad], and of their segments over the sensor noise."""
+        """Return the errors of free runs of the untouched trials [rad], and of their segments over the sensor noise."""
         errors, over_noise = test_errors(self.search, self.untouched, {"": model}, USUAL_STEP)
         return errors[""], over_noise[""]
 

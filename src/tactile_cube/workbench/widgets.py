@@ -14,12 +14,12 @@ YELLOW, RED = "background:#fff4ce;padding:4px 8px", "background:#ffe3dc;padding:
 
 
 def row_of(*parts: LayoutDOM, **more: Any) -> Row:
-    """Widgets beside each other, in as many lines as the window needs."""
+    """Place widgets beside each other, in as many lines as the window needs."""
     return Row(*parts, sizing_mode="stretch_width", styles={"flex-wrap": "wrap"}, **more)
 
 
 def column_of(*parts: LayoutDOM, **more: Any) -> Column:
-    """Widgets below each other, as wide as the window allows."""
+    """Place widgets below each other, as wide as the window allows."""
     return Column(*parts, sizing_mode="stretch_width", **more)
 
 

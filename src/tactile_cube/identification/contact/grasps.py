@@ -56,7 +56,7 @@ class Grasp:
     """
 
     def __init__(self, replay: HandReplay, trial: Trial) -> None:
-        """Simulates nothing yet."""
+        """Simulate nothing yet."""
         assert trial.load is not None, "a trial with an object"
         self.trial, self._replay, self._load = trial, replay, trial.load
         joints = trial.position.shape[1]
@@ -100,7 +100,7 @@ class Grasp:
         return np.stack(columns, axis=1)
 
     def _descended(self, contact: ContactModel, unknown: Array, target: Array, slopes: Array) -> tuple[Array, Array]:
-        """Gauss-Newton steps; what each of them saw corrects the slopes.
+        """Take Gauss-Newton steps; what each of them saw corrects the slopes.
 
         Source: C. G. Broyden, A class of methods for solving nonlinear simultaneous equations, 1965.
         """
@@ -141,7 +141,7 @@ class Grasps(Problem):
     finest = STEP  # initialisations differ by more in when something slips
 
     def __init__(self, grasps: Sequence[Grasp]) -> None:
-        """Simulates nothing yet; other problems may have the same grasps."""
+        """Simulate nothing yet; other problems may have the same grasps."""
         self.grasps = list(grasps)
         self.joints = grasps[0].trial.position.shape[1]
         alike = Counter(one.trial.initialisation for one in grasps)
@@ -163,7 +163,7 @@ class Grasps(Problem):
         self._trust: Array = np.ones(len(grasps))
 
     def prediction(self, model: Model) -> Array:
-        """Minus what is left (G, R), in rad and m."""
+        """Return minus what is left (G, R), in rad and m."""
         return self._padded([-np.r_[left[::EVERY].ravel(), unknown] for unknown, left in self._fitted(model)])
 
     def linearise_starts(self, model: Model) -> None:
@@ -176,7 +176,7 @@ class Grasps(Problem):
         return np.asarray(x * self._trust.reshape(-1, *[1] * (x.ndim - 1)))
 
     def columns(self, model: Model, unknowns: Sequence[Unknown], step: float = STEP) -> tuple[Array, Array]:
-        """Prediction (G, R), and wide secants (G, R, P), weighted, per unit of each unknown's scale.
+        """Return the prediction (G, R), and wide secants (G, R, P), weighted, per unit of each unknown's scale.
 
         How far two slips are apart in time has a corner where they coincide: a secant over it leads to their mean.
         """
@@ -190,7 +190,7 @@ class Grasps(Problem):
         return base, np.stack(found, axis=-1) if found else np.zeros((*base.shape, 0))
 
     def squares(self, model: Model) -> float:
-        """Weighted squared error of a model."""
+        """Return the weighted squared error of a model."""
         return float(self.cost(self.residual(self.prediction(model))).sum())
 
     def judged(self, model: Model) -> Judgement:
@@ -213,7 +213,7 @@ class Grasps(Problem):
         return Judgement(model, costs.ravel(), samples.ravel(), residual, errors, trial)
 
     def errors(self, model: Model, joints: Sequence[str]) -> ErrorSummary:
-        """RMS error [rad], offsets and the object's place fitted in each trial."""
+        """Return the RMS error [rad], offsets and the object's place fitted in each trial."""
         left = [
             np.where(one.trial.valid[:, None], residual, np.nan)
             for one, (_, residual) in zip(self.grasps, self._fitted(model), strict=True)
@@ -233,7 +233,7 @@ class Grasps(Problem):
         return found
 
     def _sums(self, numbers: Array) -> Array:
-        """Sums over the rows of each joint, then what belongs to offsets and place, (G, joints + joints + 3)."""
+        """Return sums over the rows of each joint, then what belongs to offsets and place, (G, joints + joints + 3)."""
         last = self.joints + 3
         rows = numbers[:, :-last].reshape(len(numbers), -1, self.joints)
         return np.column_stack([rows.sum(axis=1), numbers[:, -last:]])
@@ -291,7 +291,7 @@ def open_grasps(recording: Recording, model: ModelFile | None, step: float, seed
 
 
 def some_of_each_kind(problem: Grasps, count: int) -> Grasps:
-    """At most so many trials of each kind, from as many initialisations and with as many loads as possible."""
+    """Return at most so many trials of each kind, from as many initialisations and with as many loads as possible."""
     kinds: dict[str, list[Grasp]] = {}
     for one in problem.grasps:
         kinds.setdefault(one.trial.kind, []).append(one)

@@ -132,7 +132,7 @@ class ContactIdentification:
         ]
 
     def as_json(self) -> dict[str, Any]:
-        """Plain numbers, errors in rad."""
+        """Return plain numbers, errors in rad."""
         return {
             "effects": [one.model_dump() for one in self.effects()],
             "error": self.errors,
@@ -204,7 +204,7 @@ class ContactSearch:
     """The search for what a contact lacks: laws by themselves, sets that grow, the best judged on held-out trials."""
 
     def __init__(self, grasps: OpenGrasps, criteria: Criteria, say: Say) -> None:
-        """Simulates the contact as it is stated."""
+        """Simulate the contact as it is stated."""
         self.criteria, self.say = criteria, say
         self.few, self.problem = (some_of_each_kind(grasps.fitted, count) for count in (LOOKED, FITTED))
         self.validation = some_of_each_kind(grasps.held_out, JUDGED)
@@ -286,7 +286,7 @@ class ContactDiagnosis(ContactIdentification):
         return self.answer.kind
 
     def as_json(self) -> dict[str, Any]:
-        """In the terms of diagnosis.json; errors in rad."""
+        """Return the same in the terms of diagnosis.json; errors in rad."""
         explanations = [(self.answer.chosen, self.fitted), *self.rivals]
         entries, unknown = effect_entries(explanations), self.verdict == "unknown_effect"
         return {

@@ -131,7 +131,7 @@ def renewed(problem: Problem, fitted: Fit, prediction: Array, columns: Array) ->
 
 
 def prior_penalty(model: Model, unknowns: Sequence[Unknown]) -> float:
-    """Squared distance from what is expected beforehand, in standard deviations."""
+    """Return the squared distance from what is expected beforehand, in standard deviations."""
     return float(sum(((u.of(model) - u.centre) / u.spread) ** 2 for u in unknowns))
 
 
@@ -145,7 +145,7 @@ def _information(problem: Problem, columns: Array) -> Array:
 
 
 def _stepped(problem: Problem, fitted: Fit, trust: float, damping: float) -> tuple[Model, float]:
-    """Damped Gauss-Newton step, and by how much it promises to lower the cost with its weighted penalty.
+    """Return the damped Gauss-Newton step, and by how much it promises to lower the cost with its weighted penalty.
 
     An unknown that would leave its bounds stops there and the others are solved anew.
     """

@@ -171,28 +171,28 @@ class Problem:
         return np.asarray(first.ravel())
 
     def free(self, x: Array) -> Array:
-        """Residuals or columns (G, R) or (G, R, P) with the starts integrated out."""
+        """Return the residuals or columns (G, R) or (G, R, P) with the starts integrated out."""
         wide = x if x.ndim == 3 else x[..., None]
         inner = np.swapaxes(self._starts, 1, 2) @ wide
         freed: Array = wide - self._starts @ (self._inverse @ inner)
         return freed if x.ndim == 3 else freed[..., 0]
 
     def predictions(self, models: Sequence[Model], near: Model | None = None) -> Array:
-        """(models, G, R) [rad]; of models that are close to one that is given, at a third of the cost."""
+        """Return (models, G, R) [rad]; of models that are close to one that is given, at a third of the cost."""
         simulated = self.shooting.positions(models, self.windows, self.path(near) if near else None)
         return np.stack([self.windows.by_segment(one) for one in simulated])
 
     def residual(self, prediction: Array) -> Array:
-        """Weighted measured - predicted (G, R); a simulation that ran away counts as far off."""
+        """Return the weighted measured - predicted (G, R); a simulation that ran away counts as far off."""
         return self.limited(self.measured - prediction) * self.weight
 
     def limited(self, change: Array) -> Array:
-        """Differences of positions (G, R), none larger than that of a simulation that ran away."""
+        """Return the differences of positions (G, R), none larger than that of a simulation that ran away."""
         known = np.where(np.isnan(change), self.run_away, change)
         return np.asarray(np.clip(known, -self.run_away, self.run_away))
 
     def cost(self, residual: Array) -> Array:
-        """Marginal squared error of each segment (G,), in units of the sensor's variance."""
+        """Return the marginal squared error of each segment (G,), in units of the sensor's variance."""
         return np.asarray(np.sum(residual * self.free(residual), axis=1))
 
     def columns(self, model: Model, unknowns: Sequence[Unknown], step: float = STEP) -> tuple[Array, Array]:

@@ -46,7 +46,7 @@ def spread(windows: Windows) -> Windows:
 
 
 def finer(windows: Windows, times: int) -> Windows:
-    """Windows for simulation steps so many times as short.
+    """Return the windows for simulation steps so many times as short.
 
     The first step of a row takes the mean of two commands, all others the later one. Where a row is one step that is
     what the next row's jump begins with; of the past, which only wakes memories, the mean is kept.
@@ -103,14 +103,14 @@ def resolved(
 
 
 def _shorter(recording: Recording, time: float, error: StepError) -> float | None:
-    """Rate [Hz] of the steps that suffice; None: the usual ones do."""
+    """Return the rate [Hz] of the steps that suffice; None: the usual ones do."""
     left = error(recording, FINEST)
     times = next((k for k in (1, 2, 4) if left <= HIDDEN * k), FINEST)  # errors of the step are of first order
     return None if times == 1 else times * steps_per_row(recording, time) * recording.rate
 
 
 def _longer(recording: Recording, time: float, error: StepError) -> float | None:
-    """Rate [Hz] below the controller's that suffices; None: no lower one does."""
+    """Return the rate [Hz] below the controller's that suffices; None: no lower one does."""
     stated, steps = (steps_per_row(one, time) for one in (recording, recording.with_controller_rate(recording.rate)))
     while steps < stated:
         rate = steps * recording.rate
@@ -134,7 +134,7 @@ def stated_error(recording: Recording, effects: Sequence[type[Effect]], known: M
 
 
 def step_error(recording: Recording, shooting: Shooting, model: Model, noise: Array, times: int) -> float:
-    """RMS [sensor noise] by which steps so many times as short move what constants and starts cannot follow."""
+    """Return RMS [sensor noise] by which steps so many times as short move what constants and starts cannot follow."""
     windows = spread(shooting.cut(recording, noise))
     own, fine = Problem(shooting, windows), Problem(shooting.finer(times), finer(windows, times))
     for problem in (own, fine):
@@ -203,7 +203,7 @@ def standard_errors(problem: Problem, fitted: Fit, groups: Sequence[int] | None 
 
 
 def bounds(fitted: Fitted) -> dict[tuple[str, str, int, int], tuple[float, float, float]]:
-    """(kind, key, place, initialisation) -> value and interval, cut at the unknown's own bounds.
+    """Return (kind, key, place, initialisation) -> value and interval, cut at the unknown's own bounds.
 
     The value is the best one in the model's own steps. The interval reaches from there to the best one in much shorter
     steps, and beyond both by the half width.

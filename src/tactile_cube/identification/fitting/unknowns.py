@@ -46,7 +46,7 @@ class Unknown:
     neutral: float = 0.0
 
     def of(self, model: Model) -> float:
-        """Its value in a model."""
+        """Return its value in a model."""
         if self.kind == "constant":
             return float(model.constants[self.key][self.place])
         if self.kind == "offset":
@@ -103,7 +103,7 @@ def every_effect(effects: Sequence[type[Effect]], start: Model) -> tuple[type[Ef
 
 
 def tolerance(recording: Recording) -> dict[str, tuple[float, float]]:
-    """Bounds relative to the nominal values; wide for what a bench trial of the recording measures directly.
+    """Return the bounds relative to the nominal values; wide for what a bench trial of the recording measures directly.
 
     Source: Sievers et al., ICRA 2022, II-D: K_P from a known force on a static finger, K_e from clamped links.
     """

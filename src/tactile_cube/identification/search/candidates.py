@@ -194,12 +194,12 @@ class Screen:
                 yield candidate, self.problem.limited(prediction - self.prediction) * self.problem.weight
 
     def alone(self, column: Array) -> tuple[float, float, float]:
-        """Gradient of a column, its size beside the base columns, and its size without them."""
+        """Return the gradient of a column, its size beside the base columns, and its size without them."""
         gradient, gram = self.products(column[..., None])
         return float(gradient[0]), float(gram[0, 0]), float(np.sum(column * self.problem.free(column)))
 
     def products(self, columns: Array) -> tuple[Array, Array]:
-        """Gradient (C,) and products (C, C) of columns (G, R, C), with the base columns projected out."""
+        """Return the gradient (C,) and products (C, C) of columns (G, R, C), with the base columns projected out."""
         cross = np.einsum("grp,grc->pc", self.free_columns, columns, optimize=True)
         solved = np.linalg.solve(self.information, cross)
         gram = np.einsum("grc,grd->cd", columns, self.problem.free(columns), optimize=True) - cross.T @ solved
@@ -208,7 +208,7 @@ class Screen:
 
 
 def screen(problem: Problem, base: Fit, wanted: Sequence[Candidate]) -> list[Score]:
-    """Scores of candidates at their starts by what they explain of a fit's residual, best first."""
+    """Return the scores of candidates at their starts by what they explain of a fit's residual, best first."""
     view, scores = Screen(problem, base), []
     for candidate, column in view.columns(wanted):
         gradient, left, size = view.alone(column)

@@ -222,7 +222,7 @@ class HeldOut:
         return Problem(self.shooting, self.shooting.cut(self.trials, self.noise))
 
     def error(self, model: Model) -> float:
-        """RMS error of free runs [rad], infinite where one ran away; only unseen joint offsets are fitted."""
+        """Return RMS error of free runs [rad], infinite where one ran away; only unseen joint offsets are fitted."""
         unseen = set(self.offsets) - set(model.offsets)
         found = model.with_offsets(self.offsets)
         if unseen:

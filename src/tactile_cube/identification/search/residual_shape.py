@@ -190,7 +190,7 @@ def _shape(missing: Missing, name: str) -> Shape:
 
 
 def _derivatives(x: Array, step: float, time: float) -> tuple[Array, Array, Array]:
-    """Value, slope and curvature of (G, segment, n) by sliding parabolas."""
+    """Return the value, slope and curvature of (G, segment, n) by sliding parabolas."""
     half = max(2, min(round(PARABOLA * time / step), x.shape[1] // 4))
     lever = np.arange(-half, half + 1) * step
     weights = np.linalg.pinv(np.stack([np.ones_like(lever), lever, 0.5 * lever**2], axis=1))
@@ -201,7 +201,7 @@ def _derivatives(x: Array, step: float, time: float) -> tuple[Array, Array, Arra
 
 
 def _inertia(problem: Problem, model: Model, measured: Array) -> Array:
-    """Diagonal (n,) of the joint-space inertia at the mean posture [kg m^2]."""
+    """Return the diagonal (n,) of the joint-space inertia at the mean posture [kg m^2]."""
     posture = measured.reshape(-1, measured.shape[2]).mean(axis=0)
     mass = problem.shooting.tree.actuated_mass_matrix(posture)
     return np.asarray(np.diag(mass) + model.constants["reflected_inertia"])

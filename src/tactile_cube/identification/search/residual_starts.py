@@ -32,7 +32,7 @@ def periodic_candidates(
     effects: Sequence[type[Effect]],
     sizes: Sizes,
 ) -> list[Candidate]:
-    """Candidates at the strongest harmonics of what is missing, for every effect that has one."""
+    """Return the candidates at the strongest harmonics of what is missing, for every effect that has one."""
     periodic = [effect for effect in effects if any(HARMONIC in form for form in forms(effect))]
     found = []
     for missing in missing_torques:
@@ -76,7 +76,7 @@ def _starts(
 def peaks(
     position: Array, torque: Array, weight: Array, initialisation: NDArray[np.int64], size: float = 1.0
 ) -> list[tuple[float, float, float]]:
-    """Strongest harmonics of the torque over the position: (harmonic, sine part, cosine part), strongest first.
+    """Return strongest harmonics of the torque over the position: (harmonic, sine part, cosine part), strongest first.
 
     Each robot initialisation brings joint offsets that are not known well, so phases are compared within one only.
     Harmonics go up to `size` times a finger's.
@@ -118,7 +118,7 @@ def profile_candidates(
 
 
 def start_of(effect: type[Effect], form: Mapping[str, float], missing: Missing, scales: Scales) -> Mapping[str, float]:
-    """Control torques [N m] whose profile is nearest to the missing torque's mean over the position."""
+    """Return the control torques [N m] whose profile is nearest to the missing torque's mean over the position."""
     low, high = scales.low, scales.high
     position = missing.signals[f"position of {missing.joint} [rad]"]
     edges = np.linspace(low, high, BINS + 1)
@@ -135,7 +135,7 @@ def start_of(effect: type[Effect], form: Mapping[str, float], missing: Missing, 
 
 
 def profile_of(effect: type[Effect], values: Mapping[str, float], angles: Array) -> Array:
-    """Torque (N,) of an effect with these values, all others neutral, at each angle [N m]."""
+    """Return the torque (N,) of an effect with these values, all others neutral, at each angle [N m]."""
     known = np.array([values.get(p.name, p.neutral) for p in effect.parameters])
     x = np.zeros((ROWS, 1))
     torques = []
@@ -148,7 +148,7 @@ def profile_of(effect: type[Effect], values: Mapping[str, float], angles: Array)
 def residual_candidates(
     problem: Problem, recording: Recording, fitted: Fit, effects: Sequence[type[Effect]]
 ) -> list[Candidate]:
-    """Candidates among `effects` for what a fit leaves unexplained on the windows that were fitted."""
+    """Return the candidates among `effects` for what a fit leaves unexplained on the windows that were fitted."""
     missing = missing_torques(problem, recording, fitted.model, fitted.residual)
     sizes = problem.shooting.sizes
     periodic = periodic_candidates(missing, recording, fitted.model, effects, sizes)

@@ -20,7 +20,7 @@ class ErrorSummary:
 
 
 def residuals(trials: Sequence[Trial], simulated: Sequence[Array]) -> list[Array]:
-    """Measured - simulated (n, joints) [rad] of each trial, without the mean over its robot initialisation's trials.
+    """Return measured - simulated (n, joints) [rad] of each trial, without the mean over its initialisation's trials.
 
     The mean is the joint offset. nan where a sample was bridged; `simulated` are positions (n, joints) [rad].
     """
@@ -57,12 +57,12 @@ def normalised_fit(trials: Sequence[Trial], errors: Sequence[Array], joints: Seq
 
 
 def free_run_error(recording: Recording, simulated: Sequence[Simulated]) -> ErrorSummary:
-    """RMS error [rad] of a recording's trials simulated freely."""
+    """Return the RMS error [rad] of a recording's trials simulated freely."""
     return summarise_errors(residuals(recording.trials, [one.position for one in simulated]), recording.joints)
 
 
 def summarise_errors(errors: Sequence[Array], joints: Sequence[str]) -> ErrorSummary:
-    """RMS of residuals (n, joints), nan left out, overall and per joint."""
+    """Return the RMS of residuals (n, joints), nan left out, overall and per joint."""
     squares = np.concatenate([error**2 for error in errors])
     by_joint = np.sqrt(np.nanmean(squares, axis=0))
     return ErrorSummary(float(np.sqrt(np.nanmean(squares))), dict(zip(joints, map(float, by_joint), strict=True)))

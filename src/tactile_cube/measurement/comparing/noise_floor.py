@@ -31,7 +31,7 @@ class Repeats(NamedTuple):
 
 
 def aligned_repeats(trials: Sequence[Trial]) -> list[Repeats]:
-    """Groups of two or more repeats.
+    """Return the groups of two or more repeats.
 
     Trials repeat each other if they are of one kind and their commands agree after a shift in time. Left out are
     bridged samples and a joint's wait at its start, which differs from repeat to repeat and which a simulation starts
@@ -86,7 +86,7 @@ def _differs(first: Array, other: Array) -> float:
 
 
 def _telling(trial: Trial) -> NDArray[np.bool_]:
-    """(n, joints): measured, and the joint has left its start (if it ever does)."""
+    """Return (n, joints): measured, and the joint has left its start (if it ever does)."""
     left = np.abs(trial.position - trial.position[0]) > LEFT_START
     gone = np.maximum.accumulate(left, axis=0) | ~left.any(axis=0)
     return np.asarray(gone & trial.valid[:, None])
@@ -122,7 +122,7 @@ class Drift:
     repeats: int
 
     def sentence(self, unit: str) -> str:
-        """In words; `unit` of the position: rad or m."""
+        """Say it in words; `unit` of the position: rad or m."""
         verb, how = ("follows", ("worse", "better")) if self.tracking else ("answers", ("further", "less far"))
         every = "a minute" if self.clock else "a repeat (its trials count time from 0 each)"
         return (
@@ -162,7 +162,7 @@ def drifts(recording: Recording, groups: Sequence[Repeats], sensor: Array) -> tu
 
 
 def _level(trial: Trial, tracking: bool) -> Array:
-    """RMS (joints,) of what a trial is behind its command, or of its motion [rad], its own mean taken out."""
+    """Return RMS (joints,) of what a trial is behind its command, or of its motion [rad], its own mean taken out."""
     signal = (trial.command if tracking else 0.0) - trial.position
     return np.asarray(signal[trial.valid].std(axis=0))
 
@@ -209,7 +209,7 @@ def noise_floor(recording: Recording, step_size: Mapping[str, float] | None = No
 
 
 def _scatter(groups: Sequence[Repeats]) -> Array:
-    """Variance (joints,) of a repeat about the mean of its group, each repeat's own constant removed."""
+    """Return the variance (joints,) of a repeat about the mean of its group, each repeat's own constant removed."""
     joints = groups[0].positions.shape[2]
     total, freedom = np.zeros(joints), np.zeros(joints)
     for group in groups:

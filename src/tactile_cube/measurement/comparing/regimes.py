@@ -51,7 +51,7 @@ def regimes(trials: Sequence[Trial], errors: Sequence[Array], joints: Sequence[s
 
 
 def latest_direction(velocity: Array) -> Array:
-    """+1 or -1 by the sign of the latest motion, 0 before the first one."""
+    """Return +1 or -1 by the sign of the latest motion, 0 before the first one."""
     sign = np.where(np.abs(velocity) > MOVING, np.sign(velocity), 0.0)
     latest = np.maximum.accumulate(np.where(sign != 0, np.arange(len(sign)), 0))
     return np.asarray(sign[latest])
@@ -69,7 +69,7 @@ def after_reversal(velocity: Array, step: float) -> Mask:
 
 
 def _parts(trials: Sequence[Trial], velocities: Sequence[Array], joint: int) -> dict[str, dict[str, Mask]]:
-    """Dimension -> regime -> the samples (of all trials end to end) of a joint that are in it."""
+    """Return dimension -> regime -> the samples (of all trials end to end) of a joint that are in it."""
     velocity = np.concatenate([one[:, joint] for one in velocities])
     speed, edges = np.abs(velocity), [0.0, *SPEEDS.values()]
     turned = np.concatenate(
@@ -204,7 +204,7 @@ def whiteness(trials: Sequence[Trial], errors: Sequence[Array], joints: Sequence
 
 
 def ljung_box(values: Array) -> float:
-    """p-value of the Ljung-Box test: small means that `values` are no white noise."""
+    """Return the p-value of the Ljung-Box test: small means that `values` are no white noise."""
     n, lags = len(values), min(LAGS, len(values) // 5)
     correlation = _autocorrelation(values)[1 : lags + 1]
     statistic = n * (n + 2) * np.sum(correlation**2 / (n - np.arange(1, lags + 1)))
@@ -244,7 +244,7 @@ def _causes(trial: Trial, joints: Sequence[str]) -> dict[str, Array]:
 
 
 def _strongest(error: tuple[Array, Array], cause: tuple[Array, Array], step: float) -> tuple[float, float, float]:
-    """Correlation, delay [s] and p-value at the lag where the residual follows the cause best.
+    """Return the correlation, delay [s] and p-value at the lag where the residual follows the cause best.
 
     Either signal comes with its autocorrelation.
     """
@@ -264,7 +264,7 @@ def _strongest(error: tuple[Array, Array], cause: tuple[Array, Array], step: flo
 
 
 def _memory(autocorrelation: Array) -> float:
-    """Samples until an autocorrelation has fallen below 1/e."""
+    """Return the samples until an autocorrelation has fallen below 1/e."""
     below = np.flatnonzero(autocorrelation < np.exp(-1))
     return float(below[0]) if len(below) else float(len(autocorrelation))
 

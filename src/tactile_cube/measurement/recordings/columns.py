@@ -135,7 +135,7 @@ def _outliers(values: Array) -> tuple[NDArray[np.int64], Array]:
 
 
 def _far(values: Array) -> Array:
-    """Difference of each reading from the cubic, 0 where it is near the median."""
+    """Return the difference of each reading from the cubic, 0 where it is near the median."""
     median, cubic = _beside(values)
     far = np.abs(values - cubic)
     far[np.abs(values - median) < SPIKE * far] = 0.0
@@ -143,7 +143,7 @@ def _far(values: Array) -> Array:
 
 
 def _beside(values: Array) -> tuple[Array, Array]:
-    """Median of the five readings around each one, and the cubic through the other four."""
+    """Return the median of the five readings around each one, and the cubic through the other four."""
     padded = np.pad(values, NEAR, mode="reflect", reflect_type="odd")
     around = np.lib.stride_tricks.sliding_window_view(padded, 2 * NEAR + 1)
     return np.median(around, axis=1), around @ (np.array([-1.0, 4.0, 0.0, 4.0, -1.0]) / 6.0)
@@ -159,13 +159,13 @@ Rows = TypeVar("Rows")
 
 
 def rows_of(signals: Rows, rows: slice | NDArray[np.bool_]) -> Rows:
-    """Columns, a trial or a table to be written with these rows of its arrays alone."""
+    """Return the columns, a trial or a table to be written with these rows of its arrays alone."""
     arrays = {one.name: getattr(signals, one.name) for one in fields(signals)}  # type: ignore[arg-type]
     return replace(signals, **{name: a[rows] for name, a in arrays.items() if isinstance(a, np.ndarray)})  # type: ignore[type-var]
 
 
 def check_time(columns: TrialColumns, rate: float, path: Path) -> tuple[TrialColumns, list[str]]:
-    """Columns without repeated time stamps, and warnings about jitter and dropped samples.
+    """Return the columns without repeated time stamps, and warnings about jitter and dropped samples.
 
     Raises:
         InputError: time runs backwards, the rate is not the stated one, or a gap is too long to bridge.
@@ -239,7 +239,7 @@ def _require_rate(gaps: Array, rate: float, path: Path) -> None:
 
 
 def on_grid(columns: TrialColumns, rate: float) -> tuple[TrialColumns, NDArray[np.bool_]]:
-    """Columns at uniform time steps from 0, and which samples are not bridged over a gap.
+    """Return the columns at uniform time steps from 0, and which samples are not bridged over a gap.
 
     Positions and torques are interpolated; a command is held until the next one, as a controller does.
     """

@@ -47,7 +47,7 @@ def check_joints(description: Description, rig: Rig, file: Path) -> None:
 
 
 def check_coupling(description: Description, rig: Rig) -> list[str]:
-    """Warnings where the URDF and recording.yaml disagree on which joint follows which."""
+    """Return the warnings where the URDF and recording.yaml disagree on which joint follows which."""
     mimics = {name: joint.mimics for name, joint in rig.joints.items() if joint.mimics is not None}
     warnings = [
         f"key 'coupled': the URDF lets '{name}' mimic '{mimics[name]}', recording.yaml says {said.joint}"

@@ -24,7 +24,7 @@ MOVES = 0.02  # [rad] range below which a signal says nothing about its neighbou
 
 
 def check_units(columns: TrialColumns, joints: list[RigJoint], gains: Gains, path: Path) -> list[str]:
-    """Warnings about angles outside the joints' limits.
+    """Return warnings about angles outside the joints' limits.
 
     Raises:
         InputError: angles that only make sense in degrees, or that make no sense at all.
@@ -68,7 +68,7 @@ def _check_one_in_degrees(joint: str, command: Array, position: Array, path: Pat
 
 
 def torque_over_law(columns: TrialColumns, index: int, gains: Gains) -> float | None:
-    """Times the impedance law that a joint's measured torque is: 1 in the right units, whatever friction does.
+    """Return the ratio of a joint's measured torque to the impedance law: 1 in the right units, whatever friction does.
 
     None: the one does not go with the other.
     """
@@ -100,7 +100,7 @@ def _check_gain(joint: str, columns: TrialColumns, index: int, gains: Gains, pat
 
 
 def check_assignment(columns: TrialColumns, joints: list[RigJoint], path: Path) -> list[str]:
-    """Warnings about joints that do not answer to their commands.
+    """Return warnings about joints that do not answer to their commands.
 
     Raises:
         InputError: a joint follows another joint's command, or moves against its own.
@@ -158,7 +158,7 @@ def _mirrored(command: Array, position: Array) -> bool:
 
 
 def check_roles(columns: TrialColumns, joints: tuple[str, ...], path: Path) -> list[str]:
-    """Warnings about a command that scatters as a sensor beside a position that does not: exchanged columns."""
+    """Return warnings about a command that scatters as a sensor beside a position that does not: exchanged columns."""
     if len(columns.time) < 4:
         return []
     # third differences: zero of what is held, next to nothing of a smooth curve

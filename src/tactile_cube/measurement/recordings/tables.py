@@ -67,7 +67,7 @@ def dialect_of(path: Path) -> Dialect:
 
 
 def _encoding(start: bytes) -> str:
-    """UTF-8, or UTF-16 by its first bytes, or else Windows' western one, in which degrees are the byte 0xB0."""
+    """Return UTF-8, or UTF-16 by its first bytes, or else Windows' western one, in which degrees are the byte 0xB0."""
     if start.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return "utf-16"
     try:

@@ -99,7 +99,7 @@ class Trial(TrialColumns):
         return float(self.time[-1])
 
     def velocity(self, window: float = 0.03) -> Array:
-        """Measured velocity (n, joints) [rad/s]: slope of a straight line through a sliding window [s].
+        """Return the measured velocity (n, joints) [rad/s]: slope of a straight line through a sliding window [s].
 
         The window keeps quantisation out; a recording's sensor gives no velocity of its own.
         """

@@ -99,7 +99,7 @@ def _narrow(columns: Mapping[str, Array], rows: slice = slice(None)) -> dict[str
 
 
 def cut_trial(trial: TrialTable, length: float | None) -> list[TrialTable]:
-    """Pieces of `length` [s] of a trial, on its clock; a rest of less than half of that is dropped."""
+    """Return the pieces of `length` [s] of a trial, on its clock; a rest of less than half of that is dropped."""
     duration = float(trial.time[-1] - trial.time[0])
     if length is not None and not length * len(trial.time) >= MINIMUM_SAMPLES * duration:
         raise InputError(f"source.length={length:g}: pieces need {MINIMUM_SAMPLES} rows; give more seconds")

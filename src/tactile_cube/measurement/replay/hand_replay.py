@@ -38,7 +38,7 @@ class ContactModel:
         return constants
 
     def without_neutral(self) -> frozenset[tuple[str, str, float]]:
-        """(effect, parameter, value) of all that differs from the world of the paper."""
+        """Return (effect, parameter, value) of all that differs from the world of the paper."""
         neutral = {(name, p.name): p.neutral for name in self.values for p in contact_catalogue()[name].parameters}
         every = [(name, key, value) for name, values in self.values.items() for key, value in values.items()]
         return frozenset(one for one in every if one[2] != neutral[one[:2]])
@@ -65,7 +65,7 @@ class HandReplay:
         hand: Hand = DLR_HAND2,
         engine: EngineName = "bullet",
     ) -> None:
-        """Builds the world of a recording of the whole hand; the model's joint offsets are not used.
+        """Build the world of a recording of the whole hand; the model's joint offsets are not used.
 
         Physics steps last `step` [s] at most.
 
@@ -143,12 +143,12 @@ def _require_hand(recording: Recording, hand: Hand) -> None:
 
 
 def to_world(hand: Hand, position: Array, quaternion: Array) -> tuple[Array, Array]:
-    """Position (3,) [m] and quaternion xyzw (4,) in the world of a pose given in the hand's frame."""
+    """Return the position (3,) [m] and quaternion xyzw (4,) in the world of a pose given in the hand's frame."""
     turned = Rotation.from_matrix(hand.rotation) * Rotation.from_quat(np.array(quaternion))
     return hand.position + hand.rotation @ position, np.asarray(turned.as_quat())
 
 
 def to_hand(hand: Hand, position: Array, quaternion: Array) -> tuple[Array, Array]:
-    """Position (3,) [m] and quaternion xyzw (4,) in the hand's frame of a pose given in the world."""
+    """Return the position (3,) [m] and quaternion xyzw (4,) in the hand's frame of a pose given in the world."""
     turned = Rotation.from_matrix(hand.rotation.T) * Rotation.from_quat(np.array(quaternion))
     return hand.rotation.T @ (position - hand.position), np.asarray(turned.as_quat())

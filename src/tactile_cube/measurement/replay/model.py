@@ -55,7 +55,7 @@ class Term:
 
 
 def terms_of(effects: Iterable[tuple[str, Mapping[str, float]]], joints: tuple[str, ...]) -> tuple[Term, ...]:
-    """Effects given as (`NAME@JOINT` or `NAME`, parameter -> value); what is left out is typical.
+    """Return effects given as (`NAME@JOINT` or `NAME`, parameter -> value); what is left out is typical.
 
     Raises:
         InputError: an unknown effect, joint or parameter.
@@ -114,7 +114,7 @@ def nominal_model(recording: Recording, known: ModelFile | None = None) -> Model
 
 
 def no_offsets(recording: Recording) -> dict[int, Array]:
-    """No joint offset in any initialisation."""
+    """Return no joint offset in any initialisation."""
     return {trial.initialisation: np.zeros(len(recording.joints)) for trial in recording.trials}
 
 
@@ -154,7 +154,7 @@ def _effects(recording: Recording, known: ModelFile | None) -> list[EffectEstima
 
 
 def _unknown_masses(recording: Recording) -> list[EffectEstimate]:
-    """Masses of links that are guesses: more or less where they are now, by as much as they are or less."""
+    """Return the masses of links that are guesses: more or less where they are now, by as much as they are or less."""
     if "mass" not in recording.description.unknown:
         return []
     found = []
@@ -166,7 +166,7 @@ def _unknown_masses(recording: Recording) -> list[EffectEstimate]:
 
 
 def _drawn(estimate: Estimate, spread: float, rng: np.random.Generator) -> float:
-    """Uniform in the interval, or within the relative spread where there is none."""
+    """Draw uniformly in the interval, or within the relative spread where there is none."""
     if not np.isfinite(estimate.value):
         return estimate.value
     if estimate.high > estimate.low:

@@ -42,7 +42,7 @@ def jump_ratio(plant: Plant, memory: Array, command: Array) -> tuple[Array, Arra
 
 
 def gaps(plant: Plant, memory: Array) -> Array:
-    """Width of the gap that each joint's motor moves through freely (..., n) [rad]; 0 without one."""
+    """Return the width of the gap that each joint's motor moves through freely (..., n) [rad]; 0 without one."""
     if Backlash not in plant.effects:
         return np.zeros(len(plant.joint_names))
     _, gap, smooth, _, crossing = np.moveaxis(plant.view(memory, "parameters:backlash"), -1, 0)
@@ -64,7 +64,7 @@ FEWEST = 3  # steps of a row of which two feel nothing of the row before
 
 
 def simulated_jumps(acting: Array, windows: Windows) -> Array:
-    """Simulated command at each reading less the one that the log feels (S, K segment, n).
+    """Return the simulated command at each reading less the one that the log feels (S, K segment, n).
 
     Known exactly unless an effect changes the command on its way; then half the change across the reading, smoothed
     where a row is one step. `acting` (S, K segment substeps, n) acted in each step [rad].
@@ -88,7 +88,7 @@ def read_out(
     torque_limit: Array,
     free: Array | float = 0.0,
 ) -> tuple[Array, Array]:
-    """Position [rad] and torque [N m] (..., joints) under the command that a log's instant feels.
+    """Return the position [rad] and torque [N m] (..., joints) under the command that a log's instant feels.
 
     What was simulated under a command that is `jump` [rad] more, of which the motor follows `free` without torque (see
     `free_way`), is freed of the jump in torque and deflection (`ratios`, see `jump_ratio`), unless its torque is at the

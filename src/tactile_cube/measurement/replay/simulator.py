@@ -154,15 +154,15 @@ class Simulator:
         return np.concatenate([self.plant.view(memory, key).ravel() for key in MECHANICS])
 
     def gaps(self, model: Model) -> Array:
-        """Width of the gap in each joint's transmission (n,) [rad]."""
+        """Return the width of the gap in each joint's transmission (n,) [rad]."""
         return gaps(self.plant, self.memory(model))
 
     def integrating(self, model: Model) -> list[int]:
-        """Joints whose controller integrates its error."""
+        """Return the joints whose controller integrates its error."""
         return integrating_joints(model, self.plant.joint_names)
 
     def memory(self, model: Model) -> Array:
-        """Memory (size,) of the plant with a model's constants and effects."""
+        """Return the memory (size,) of the plant with a model's constants and effects."""
         known: dict[str, Any] = {key: model.constants[key] for key in DRIVE}
         memory: Array = self.plant.memory(DrivetrainConstants(**known), gravity=self.recording.gravity)
         self.plant.view(memory, "friction_creep")[:] = model.constants.get("friction_creep", 0.0)
@@ -208,7 +208,7 @@ class Simulator:
             _zero_links(out[0], windows, joints)
 
     def _as_read(self, position: Array, model: Model, windows: Windows) -> Array:
-        """Positions (S, K segment, M) as old as the log reads them."""
+        """Return the positions (S, K segment, M) as old as the log reads them."""
         delay = model.constants.get("reading_delay", np.zeros(1))
         if not delay.any():
             return position
@@ -243,7 +243,7 @@ class Simulator:
             list(pool.map(run, parts[:-1], parts[1:]))
 
     def _past(self, model: Model, windows: Windows) -> int:
-        """Steps before a window that its effects on the command remember."""
+        """Return the steps before a window that its effects on the command remember."""
         longest = windows.history * windows.substeps
         effects = [term.effect for term in model.terms if term.effect.stage is Stage.COMMAND]
         return max((min(e.kept(self.plant.dt), longest) if e.bounded_memory else longest for e in effects), default=0)
@@ -315,7 +315,7 @@ def _zero_links(shown: Array, windows: Windows, joints: int) -> None:
 
 
 def force_torque(tree: RigidBodyTree, force: KnownForce, position: Array) -> Array:
-    """Torques (joints,) [N m] that a force on a link puts on the actuated joints at `position` (joints,) [rad].
+    """Return torques (joints,) [N m] that a force on a link puts on the actuated joints at `position` (joints,) [rad].
 
     Raises:
         InputError: the force names a joint that the rig does not have.
@@ -336,7 +336,7 @@ def force_torque(tree: RigidBodyTree, force: KnownForce, position: Array) -> Arr
 
 
 def link_frames(tree: RigidBodyTree, position: Array) -> list[tuple[Array, Array]]:
-    """Rotation (3, 3) and origin (3,) [m] of every link in the base frame, at actuated `position` (joints,)."""
+    """Return rotation (3, 3) and origin (3,) [m] of every link in the base frame, at actuated `position` (joints,)."""
     angles = tree.ratio * position[tree.follow] + tree.offset
     frames: list[tuple[Array, Array]] = []
     for dof in range(tree.dofs):
@@ -352,7 +352,7 @@ def link_frames(tree: RigidBodyTree, position: Array) -> list[tuple[Array, Array
 
 
 def integrating_joints(model: Model, joints: tuple[str, ...]) -> list[int]:
-    """Joints whose controller integrates its error in a model."""
+    """Return the joints whose controller integrates its error in a model."""
     return [joints.index(t.joint) for t in model.terms if t.effect is IntegralAction and t.values["ki"] > 0.0]
 
 
@@ -389,7 +389,7 @@ def wind_up(plant: Plant, model: Model, windows: Windows, memory: Array) -> None
 
 @compiled_once
 def integrated(errors: Array, start: float, gain: float, limit: float) -> float:
-    """Integral [N m] after errors (T,) [rad s], kept within a limit unless that is zero."""
+    """Return the integral [N m] after errors (T,) [rad s], kept within a limit unless that is zero."""
     value = start
     for error in errors:
         value += gain * error

@@ -98,7 +98,7 @@ class Windows:
         return len(self.commands)
 
     def take(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> Windows:
-        """Some of the windows."""
+        """Return some of the windows."""
         places = [int(k) for k in np.arange(len(self))[chosen]]
         picked: dict[str, Any] = {key: tuple(getattr(self, key)[k] for k in places) for key in ("forces", "errors")}
         return replace(self, **{key: getattr(self, key)[chosen] for key in ROWS}, **picked)
@@ -114,7 +114,7 @@ class Windows:
         )
 
     def by_segment(self, values: Array) -> Array:
-        """(S, K segment, n) -> (S K, segment n)."""
+        """Return the reshape (S, K segment, n) to (S K, segment n)."""
         return values.reshape(len(self) * self.segments, -1)
 
 
@@ -281,7 +281,7 @@ def _rows(fine: Array, first: int, last: int) -> Array:
 
 
 def steps_per_row(recording: Recording, time: float = 1.0) -> int:
-    """Simulation steps between two samples."""
+    """Return the simulation steps between two samples."""
     return recording.substeps(LONGEST_STEP * time)
 
 
@@ -291,7 +291,7 @@ def asks_for_much(jump: Array, kp: Array, limit: Array) -> NDArray[np.bool_]:
 
 
 def _gains(recording: Recording, trial: Trial) -> Array:
-    """kp, kd and torque limit (3, n) of a trial over those of the recording; 1 where the recording has none."""
+    """Return kp, kd and torque limit (3, n) of a trial over those of the recording; 1 where the recording has none."""
     own = np.array([trial.gains.kp, trial.gains.kd, trial.gains.torque_limit])
     common = np.array([recording.gains.kp, recording.gains.kd, recording.gains.torque_limit])
     usable = (common > 0) & np.isfinite(common) & np.isfinite(own) & (not recording.torque_controlled)
@@ -317,7 +317,7 @@ def _drive(recording: Recording, trial: Trial) -> Drive:
 
 
 def _around(command: Array, reading: str) -> tuple[Array, Array]:
-    """Commands (T, n) in force just before and just after each row is read.
+    """Return the commands (T, n) in force just before and just after each row is read.
 
     The drive feels the one before, either way: a loop reads first and commands then.
     """
@@ -352,7 +352,7 @@ def _tells(step: float, half: int, noise: Array, speed: Array | float) -> bool:
 
 
 def _unsteady(starts: Rows, kinks: Rows, rows: int) -> NDArray[np.bool_]:
-    """Segments that begin so soon after a kink that their speed changes faster than it is read (K,): they tell nothing.
+    """Return the segments (K,) that begin so soon after a kink that their speed changes faster than it is read.
 
     None where that would be most of them.
     """
@@ -368,7 +368,7 @@ def _terms(half: int) -> int:
 def _states(
     trial: Trial, command: Array, jump: Array, drive: Drive, kinks: Rows, rows: Rows, half: int
 ) -> tuple[Array, Array, Array, Array]:
-    """Position of the sensor, speed and acceleration of the link (K, n) at some rows, and the speed's noise.
+    """Return the position of the sensor, speed and acceleration of the link (K, n) at some rows, and the speed's noise.
 
     The last one is its standard deviation where that of a sample is one [1/s]. `command` (T, n) is felt by each row.
 

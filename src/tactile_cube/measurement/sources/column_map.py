@@ -136,7 +136,7 @@ def _signals(names: Sequence[str], joints: Sequence[str], mode: str, flags: Coll
 
 
 def _owners(names: Sequence[str], joints: Sequence[str]) -> dict[str, str]:
-    """Column -> joint: by the joint's name, by a number, or because there is only one joint."""
+    """Return column -> joint: by the joint's name, by a number, or because there is only one joint."""
     named = {n: max((joint for joint in joints if _names(n, joint)), key=len, default="") for n in names}
     if any(named.values()):
         return named

@@ -74,7 +74,7 @@ def nonnegative_fit(columns: Mapping[str, Array], values: Array) -> tuple[dict[s
 
 
 def resistance(v: Array) -> dict[str, Array]:
-    """Columns of what resists a velocity (n,) - damping, friction - and of a constant either way."""
+    """Return the columns of what resists a velocity (n,) - damping, friction - and of a constant either way."""
     sliding, ones = np.tanh(v / max(float(np.std(v)) / 5.0, 1e-9)), np.ones_like(v)
     return {"damping": v, "friction": sliding, "up": ones, "down": -ones}
 

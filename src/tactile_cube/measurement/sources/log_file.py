@@ -43,7 +43,7 @@ class Log:
     whole: str = ""  # name of the log that the trial was cut from
 
     def rows(self, rows: NDArray[Any], *steps: Step, name: str | None = None) -> "Log":
-        """These rows of it alone (a mask or indices)."""
+        """Return these rows of it alone (a mask or indices)."""
         parts = ({column: values[rows] for column, values in part.items()} for part in (self.table, self.texts))
         table, texts = parts
         return replace(self, table=table, texts=texts, steps=(*self.steps, *steps), name=name or self.name)
@@ -91,7 +91,7 @@ def _frame_log(path: Path) -> Log:
 
 
 def _stacked(column: polars.Series) -> NDArray[Any]:
-    """Lists of numbers as (n, width); of no width where they differ in length or hold something else."""
+    """Return lists of numbers as (n, width); of no width where they differ in length or hold something else."""
     column = column.cast(polars.List(polars.Float64), strict=False) if column.dtype.is_nested() else column
     widths = column.list.len().drop_nulls().unique()
     if len(widths) != 1 or column.null_count():
@@ -100,7 +100,7 @@ def _stacked(column: polars.Series) -> NDArray[Any]:
 
 
 def _expanded(name: str, values: NDArray[Any], names: Sequence[str] = ()) -> tuple[dict[str, NDArray[Any]], str]:
-    """Columns `name[0]`, `name[1]` ... or `name.NAME` of a table (n, width), and what to say of them."""
+    """Return columns `name[0]`, `name[1]` ... or `name.NAME` of a table (n, width), and what to say of them."""
     width = values.shape[1]
     if not 0 < width <= WIDEST:
         return {}, f"{name}: not up to {WIDEST} numbers a row, left out"
@@ -109,7 +109,7 @@ def _expanded(name: str, values: NDArray[Any], names: Sequence[str] = ()) -> tup
 
 
 def _log(path: Path, columns: Mapping[str, Any], steps: list[Step], units: Mapping[str, str]) -> Log:
-    """Numbers, dates and times of day [s] and words told apart."""
+    """Tell numbers, dates, times of day [s] and words apart."""
     table: Table = {}
     texts: dict[str, NDArray[Any]] = {}
     wrong: dict[str, tuple[int, str]] = {}
@@ -142,7 +142,7 @@ def _log(path: Path, columns: Mapping[str, Any], steps: list[Step], units: Mappi
 
 
 def _told(column: polars.Series) -> polars.Series:
-    """Text as numbers, times of day (a duration) or dates where it is that."""
+    """Return text as numbers, times of day (a duration) or dates where it is that."""
     if len(column) and column.str.contains(CLOCK).all():
         parts = [column.str.extract(CLOCK, group).str.replace(",", ".").cast(polars.Float64) for group in (1, 2, 3)]
         seconds = parts[0].fill_null(0.0) * 3600.0 + parts[1] * 60.0 + parts[2]
@@ -157,7 +157,7 @@ def _told(column: polars.Series) -> polars.Series:
 
 
 def _arrays_log(path: Path, arrays: Mapping[str, NDArray[Any]]) -> Log:
-    """Arrays with one row a sample: `(n,)`, `(n, width)` or `(width, n)`; a constant may say the time step."""
+    """Return arrays with one row a sample: `(n,)`, `(n, width)` or `(width, n)`; a constant may say the time step."""
     squeezed = {name: np.squeeze(array) for name, array in arrays.items()}
     numbers = {name: one for name, one in squeezed.items() if one.dtype.kind in "fiub"}
     flat = {name: len(one) for name, one in numbers.items() if one.ndim == 1}

@@ -67,7 +67,7 @@ class _Seen:
 
 
 def _seen(trials: Sequence[TrialTable], mode: str, weighs: bool, kp: float) -> _Seen:
-    """Nonnegative least squares of the torque of the drive, or without one of the acceleration."""
+    """Fit the torque of the drive, or without one the acceleration, by nonnegative least squares."""
     motion = motion_of(trials, 1)
     if len(motion) < FEWEST:
         return _Seen()
@@ -201,7 +201,7 @@ class Mechanism:
         )
 
     def _link(self, found: _Seen, inertia: float, gravity: float) -> tuple[float, float]:
-        """Mass [kg] and lever [m] of the link: a part of the inertia, and the weight."""
+        """Return the mass [kg] and lever [m] of the link: a part of the inertia, and the weight."""
         own = OF_LINK[str(self.robot)] * inertia
         if self.robot == "slide":
             return own, LEVER

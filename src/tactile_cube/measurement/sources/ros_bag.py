@@ -71,7 +71,7 @@ class RosBag:
 
 
 def _messages(path: Path, topics: tuple[str, str]) -> dict[str, list[tuple[float, Any]]]:
-    """Topic -> (time [s], message)."""
+    """Return topic -> (time [s], message)."""
     found: dict[str, list[tuple[float, Any]]] = {topic: [] for topic in topics}
     try:
         with regular(path).open("rb") as stream:

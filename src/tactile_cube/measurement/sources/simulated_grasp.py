@@ -135,7 +135,7 @@ class _Session:
         return s.logged(entry, command, self.loaded.simulate(trial, self.contact, offset), self.rng)
 
     def _command(self, kind: str) -> Array:
-        """Commands (n, 12) [rad]: close, carry, loosen; fingers that take no part stay away."""
+        """Return the commands (n, 12) [rad]: close, carry, loosen; fingers that take no part stay away."""
         s = self.settings
         size, centre, upright = [s.size] * 3, [0.0, 0.0, 0.0], Rotation.identity().as_quat()
         apart, pressed, away = (

@@ -53,7 +53,7 @@ HIDDEN = 0.01  # of a step: what the last row of a log may be off by a rounded r
 
 
 def rate_of(time: NDArray[np.float64], digits: int, where: str) -> float:
-    """Samples per second of rows at times (samples,) [s] of the file `where`, rounded to digits if no row shows it.
+    """Return the samples per second of rows at times (samples,) [s] of the file `where`, rounded if no row shows it.
 
     Where the steps are regular, their number over the whole time: a clock that counts from 1970 tells a step of some
     milliseconds to 0.2 us only. Else the median's, for a log with pauses has no other.

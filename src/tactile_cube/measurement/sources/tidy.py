@@ -27,7 +27,7 @@ HELD = ("command", "feedforward")
 
 
 def apart(log: Log) -> Log:
-    """Topics that share the rows of a log, named in a column of words, in columns of their own."""
+    """Put topics that share the rows of a log, named in a column of words, in columns of their own."""
     for name, texts in log.texts.items():
         kinds = sorted({str(text) for text in texts if text is not None})
         changes = np.count_nonzero(texts[1:] != texts[:-1])
@@ -47,7 +47,7 @@ def apart(log: Log) -> Log:
 
 
 def joined(logs: Sequence[Log], whole: Callable[[Sequence[str]], bool]) -> list[Log]:
-    """Logs of one trial in files of their own put together, where one file alone has not all that is needed."""
+    """Join logs of one trial in files of their own, where one file alone has not all that is needed."""
     if len(logs) < 2 or whole(list(logs[0].table)):
         return list(logs)
     groups: list[list[Log]] = []
@@ -154,7 +154,7 @@ def _measured(log: Log, columns: ColumnMap) -> list[str]:
 
 
 def _cut(log: Log, boundary: Mask, labels: Sequence[str] = (), what: str = "", kind: str = "part") -> Iterator[Log]:
-    """Pieces of a log between boundaries (n - 1,), which are named by their labels (n,) or else numbered."""
+    """Return the pieces of a log between boundaries (n - 1,), which are named by their labels (n,) or else numbered."""
     edges = [0, *(np.flatnonzero(boundary | _differ(labels, len(boundary))) + 1), len(boundary) + 1]
     for number in range(len(edges) - 1):
         rows = np.arange(edges[number], edges[number + 1])
@@ -180,7 +180,7 @@ def _episodes(log: Log) -> tuple[Sequence[str], str]:
 
 
 def _on_one_time(log: Log, columns: ColumnMap) -> Log:
-    """Signals that come in rows of their own at the times of the first joint's positions.
+    """Return signals that come in rows of their own at the times of the first joint's positions.
 
     A command is held from its last row; what is measured is interpolated.
     """

@@ -44,7 +44,7 @@ NOT_ALIKE = 0.05  # range of a position over that of its command, below which th
 
 
 def words(name: str) -> list[str]:
-    """`q1_desDeg` -> q, 1, des, deg."""
+    """Return the words of a name: `q1_desDeg` -> q, 1, des, deg."""
     return [word.lower() for word in WORD.findall(name)]
 
 
@@ -159,7 +159,7 @@ def _grips(name: str, joint: RigJoint) -> bool:
 
 
 def _share(name: str, joint: RigJoint, spans: Spans) -> Unit:
-    """-100 .. 100 of a range about its middle, or 0 .. 100 of a gripper's from its lower limit on."""
+    """Return unit of -100 .. 100 of a range about its middle, or 0 .. 100 of a gripper's from its lower limit on."""
     motor = next((one for one in spans if set(words(one)) <= {*words(name), *words(joint.name)}), None)
     span = spans[motor] if motor is not None else joint.upper - joint.lower
     if not 0.0 < span < np.inf:
@@ -177,7 +177,7 @@ def _share(name: str, joint: RigJoint, spans: Spans) -> Unit:
 
 
 def calibrated_spans(path: Path) -> dict[str, float]:
-    """Motor -> range of motion [rad] of LeRobot's calibration file.
+    """Return motor -> range of motion [rad] of LeRobot's calibration file.
 
     Raises:
         InputError: it is none.
@@ -250,7 +250,7 @@ def same_unit(command: Unit, position: Unit, ratio: float) -> tuple[Unit, Unit]:
 
 
 def torque_unit(said: str | None, name: str, prismatic: bool, values: Array) -> Unit:
-    """Unit of torques, or of a sliding joint's forces: N m or N in doubt.
+    """Return the unit of torques, or of a sliding joint's forces: N m or N in doubt.
 
     Raises:
         InputError: the column is no torque: its name says so, or it holds 0 and 1 alone.
@@ -272,6 +272,6 @@ def is_flag(values: Array) -> bool:
 
 
 def voltage_unit(name: str, torque: float) -> Unit:
-    """Unit of a motor's voltage, which makes `torque` [N m] at standstill a volt."""
+    """Return the unit of a motor's voltage, which makes `torque` [N m] at standstill a volt."""
     unit = chosen_unit(None, name, VOLT_UNITS, "") or Unit("V", 1.0, "assumed")
     return Unit(f"{unit.name} x kt / R", unit.size * torque, f"source.controller.kt, R; {unit.source}")
