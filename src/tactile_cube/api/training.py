@@ -256,7 +256,7 @@ def _key(word: str) -> str:
 
 
 def _own_grasps(job: Job, file: Path) -> str | None:
-    """Grasps of another hand or object than the package has them of, found before the first episode; else None."""
+    """Return the grasps of a hand or object that the package has none of, found before the first episode; else None."""
     env = instantiate(job.config.env)
     try:
         GraspStarts().of(env.hand, env.constants)

@@ -169,7 +169,7 @@ class Task:
         )
 
     def outcome(self, start: CubePose, now: CubePose, step: int) -> int:
-        """Index into OUTCOMES for the cube at `now` after `step` policy steps of an episode that began at `start`."""
+        """Return the index into OUTCOMES of a cube at `now`, `step` policy steps after it began at `start`."""
         if now.z - start.z < -self.height_range:
             return DROPPED
         if max(abs(now.x - start.x), abs(now.y - start.y)) > self.plane_range:

@@ -169,7 +169,7 @@ class Hand:
         return np.asarray(values[:, self._own].ravel())
 
     def action_of(self, angles: Array) -> Array:
-        """Action in [-1, 1] that asks for joint angles `(..., joints)` [rad]; angles out of range are clipped."""
+        """Return the action in [-1, 1] for joint angles `(..., joints)` [rad]; angles out of range are clipped."""
         middle = 0.5 * (self.action_lower + self.action_upper)
         half_range = 0.5 * (self.action_upper - self.action_lower)
         return np.clip((angles - middle) / half_range, -1.0, 1.0)
@@ -185,7 +185,7 @@ class Hand:
         return self.bases[0][finger], self.bases[1][finger]
 
     def finger_tips(self, finger: int, q: Array) -> Array:
-        """Centres of a fingertip's sphere in the world (n, 3) [m] for its joint angles (n, joints_per_finger) [rad]."""
+        """Return the centres of a fingertip's sphere in the world (n, 3) [m] at angles (n, joints_per_finger) [rad]."""
         return self.fingers[finger].chain.tips(*self.base_in_world(finger), q)
 
     def finger_angles(self, finger: int, targets: Array) -> Array:
@@ -199,7 +199,7 @@ class Hand:
         return self.fingers[finger].chain.angles(*self.base_in_world(finger), points, *limits)
 
     def angles_at(self, tips: Array) -> Array:
-        """Joint angles (n, joints) [rad] that bring all fingertips to points (n, fingers, 3) [m], or near them."""
+        """Return joint angles (n, joints) [rad] that bring fingertips to points (n, fingers, 3) [m], or near them."""
         if isinstance(self.fingers[0].chain, PlanarChain):  # one by one: products of a batch round differently
             rows = [[self.finger_angles(k, tip)[0] for k, tip in enumerate(row)] for row in tips]
             return np.array(rows).reshape(len(tips), -1)

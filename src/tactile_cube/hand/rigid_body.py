@@ -118,7 +118,7 @@ class RigidBodyTree:
         return np.asarray(self.ratio * positions + self.offset)
 
     def equations(self, q: Array, v: Array, gravity: Array) -> tuple[Array, Array]:
-        """M (N, N) [kg m^2] and h (N,) [N m] at positions q (N,) and velocities v (N,); gravity (3,) in the base."""
+        """Return M (N, N) [kg m^2] and h (N,) [N m] at positions q, velocities v (N,); gravity (3,) in the base."""
         M, h = np.zeros((self.dofs, self.dofs)), np.zeros(self.dofs)
         work = np.zeros((self.dofs + 1, WORK_COLUMNS))
         state = (np.asarray(q, dtype=float), np.asarray(v, dtype=float), np.asarray(gravity, dtype=float))

@@ -88,7 +88,7 @@ def undisturbed(recording: Recording, found: Iterable[Disturbance]) -> Recording
 
 
 def _by_trial(problem: Problem, errors: Array, trials: int) -> list[Array]:
-    """Errors (segments, n) of each trial in the order of time, one row for each segment from its beginning on."""
+    """Return the errors (segments, n) of each trial in the order of time, one row a segment."""
     windows = problem.windows
     rows = windows.segment
     found = []
@@ -165,7 +165,7 @@ def in_time(
 
 
 def _fitted(recording: Recording, effects: Sequence[type[Effect]], known: ModelFile | None) -> tuple[float, float]:
-    """Error of the base model [sensor noise], and when the joint that is read last is read [rows after its stamp]."""
+    """Return the base model's error [sensor noise], and when the last joint is read [rows after its stamp]."""
     noise = noise_with_links(recording)
     base = Search(recording, recording, noise, effects, lambda line: None, known, segments=SEGMENTS).base
     return base.error, float(base.fit.model.constants["reading_delay"].max() / recording.step)

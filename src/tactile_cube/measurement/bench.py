@@ -39,7 +39,7 @@ def excitation(kind: str, low: Array, high: Array, duration: float, rate: float,
 
 
 def ramps(time: Array, rng: np.random.Generator) -> Array:
-    """Straight strokes at speeds spread over a decade, in 0..1: friction at many speeds, reversals of many sizes."""
+    """Return strokes at speeds spread over a decade, in 0..1: friction at many speeds, reversals of many sizes."""
     corners, values = [0.0], [float(rng.uniform())]
     while corners[-1] < time[-1]:
         goal = float(rng.uniform())
@@ -55,7 +55,7 @@ def holds(time: Array, rng: np.random.Generator) -> Array:
 
 
 def steps(time: Array, rng: np.random.Generator) -> Array:
-    """Configurations commanded within two hundredths of a second and held, in 0..1: all the torque that a motor has."""
+    """Return configurations commanded within 0.02 s and held, in 0..1: all the torque that a motor has."""
     return _held(time, (0.4, 0.8), 0.02, rng)
 
 

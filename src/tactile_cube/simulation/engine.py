@@ -153,7 +153,7 @@ class SimulationOptions:
 
     @classmethod
     def faithful(cls, engine: EngineName = "bullet") -> SimulationOptions:
-        """For final numbers: 0.5 ms and 150 iterations, close to convergence, at a tenth of the speed."""
+        """Return options for final numbers: 0.5 ms and 150 iterations, nearly converged, at a tenth of the speed."""
         return cls(engine, dt=5e-4, substeps=200, solver_iterations=150)
 
 
@@ -194,7 +194,7 @@ class Engine(Protocol):
         """Return the contacts on the cube and between fingers in the last physics step."""
 
     def normal_forces(self) -> Array:
-        """Sums of the normal forces on the object of each finger's other links and of its tip (2, fingers) [N]."""
+        """Return sums of normal forces on the object of each finger's other links and of its tip (2, fingers) [N]."""
 
     def close(self) -> None:
         """End the simulation."""

@@ -134,7 +134,7 @@ class MetricsTable:
 
 
 def _rows_until(steps: int, path: Path) -> list[list[str]]:
-    """Header and rows up to `steps`, without a last row that a crash cut off; nothing where there are no rows."""
+    """Return header and rows up to `steps`, without a last row that a crash cut off; nothing without rows."""
     lines = path.read_text().splitlines(keepends=True)
     head, *rows = list(csv.reader(line for line in lines if line.endswith("\n"))) or [[]]
     kept = [row for row in rows if len(row) == len(head) and float(row[0]) <= steps]

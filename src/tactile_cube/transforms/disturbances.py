@@ -13,7 +13,7 @@ from tactile_cube.randomization import Distribution
 
 
 def reset_mask(tensordict: TensorDictBase, fresh: TensorDictBase) -> Tensor:
-    """Worlds that start an episode now, `(*batch, 1)` bool: those of "_reset" in `tensordict`, or all of `fresh`."""
+    """Return the worlds that start an episode, `(*batch, 1)` bool: of "_reset" in `tensordict`, or all of `fresh`."""
     mask: Tensor | None = tensordict.get("_reset", None)
     if mask is None:
         return torch.ones((*fresh.batch_size, 1), dtype=torch.bool)

@@ -157,7 +157,7 @@ def overlay(comparison: Comparison, trial: int, joint: int, before: Comparison |
 
 
 def residual(comparison: Comparison, trial: int, joint: int, before: Comparison | None = None) -> str:
-    """Measured minus simulated of one joint in one trial beside the noise floor; with `before`, also of that model."""
+    """Draw measured minus simulated of a joint in a trial and the noise floor; with `before`, also of that model."""
     time = comparison.recording.trials[trial].time
     axes, size = _difference_chart(comparison, joint, 170 if before is None else 200)
     floor = size * 1.96 * comparison.floor.joints[comparison.recording.joints[joint]]

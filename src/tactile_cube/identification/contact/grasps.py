@@ -172,7 +172,7 @@ class Grasps(Problem):
         self._trust = 1.0 / (1.0 + squares / self._counts.sum(axis=1))
 
     def free(self, x: Array) -> Array:
-        """Residuals or columns with the weight of their segments; what nobody knows of a grasp is in the residual."""
+        """Return residuals or columns weighted by segment; what is unknown of a grasp is in the residual."""
         return np.asarray(x * self._trust.reshape(-1, *[1] * (x.ndim - 1)))
 
     def columns(self, model: Model, unknowns: Sequence[Unknown], step: float = STEP) -> tuple[Array, Array]:

@@ -60,7 +60,7 @@ class Shooting(Simulator):
         return np.array([scales.of(unit) for scales in self.scales])
 
     def positions(self, models: Sequence[Model], windows: Windows, near: Path | None = None) -> Array:
-        """Measured positions that each model predicts, (models, S, K segment, sensors) [rad]; `near` a path or not."""
+        """Return the readings that each model predicts, (models, S, K segment, sensors) [rad]; `near` a path or not."""
         return self.simulate(models, [windows] * len(models), near=near)[:, 0]
 
     def positions_from(self, model: Model, initial_states: Sequence[Array], windows: Windows) -> Array:

@@ -124,7 +124,7 @@ def _longer(recording: Recording, time: float, error: StepError) -> float | None
 
 
 def stated_error(recording: Recording, effects: Sequence[type[Effect]], known: ModelFile | None = None) -> float:
-    """RMS error [sensor noise] of the model to begin with, nothing refitted, on windows spread over the recording."""
+    """Return the RMS error [sensor noise] of the initial model on windows spread over the recording."""
     start = nominal_model(recording, known)
     shooting = Shooting(recording, every_effect(effects, start))
     problem = Problem(shooting, spread(shooting.cut(recording, noise_with_links(recording))))

@@ -35,7 +35,7 @@ def residuals(trials: Sequence[Trial], simulated: Sequence[Array]) -> list[Array
 
 
 def raw_residuals(trials: Sequence[Trial], simulated: Sequence[Array]) -> list[Array]:
-    """Measured - simulated (n, joints) [rad] of each trial with nothing removed; nan where a sample was bridged."""
+    """Return measured - simulated (n, joints) [rad] of each trial; nan where a sample was bridged."""
     return [
         np.where(trial.valid[:, None], trial.position - positions, np.nan)
         for trial, positions in zip(trials, simulated, strict=True)
@@ -85,7 +85,7 @@ class FailingInterval:
 
 
 def failing_intervals(trial: str, joint: str, time: Array, residual: Array, floor: float) -> list[FailingInterval]:
-    """Intervals where the RMS over 0.2 s exceeds three noise floors; `residual` (n,) [rad], nan where bridged."""
+    """Return where the RMS over 0.2 s exceeds three noise floors; `residual` (n,) [rad], nan where bridged."""
     step = float(time[1] - time[0])
     squares = np.nan_to_num(residual) ** 2
     window = max(1, round(WINDOW / step))

@@ -54,7 +54,7 @@ def aligned_repeats(trials: Sequence[Trial]) -> list[Repeats]:
 
 
 def repeats_of(trials: Sequence[Trial], index: int) -> list[tuple[int, int]]:
-    """Trials that play the command of one again: their places, and by how many samples each starts later in it."""
+    """Return the repeats of a trial's command: their places, and by how many samples each starts later in it."""
     first = trials[index]
     lags = {
         place: lag_between(first.command, other.command, first.step)
@@ -67,7 +67,7 @@ def repeats_of(trials: Sequence[Trial], index: int) -> list[tuple[int, int]]:
 
 
 def lag_between(first: Array, other: Array, step: float) -> int | None:
-    """Samples (one a `step` [s]) by which `other` starts later in the same command (n, joints); None: another one."""
+    """Return samples (one a `step` [s]) by which `other` starts later in a command (n, joints); None: another one."""
     if len(first) == len(other) and _differs(first, other) < SAME:
         return 0
     longest = round(LONGEST_LAG / step)
@@ -189,7 +189,7 @@ class NoiseFloor:
 
 
 def noise_floor(recording: Recording, step_size: Mapping[str, float] | None = None) -> NoiseFloor:
-    """Noise floor of a recording; `step_size` is the error [rad] of the simulator's time step, joint by joint."""
+    """Return a recording's noise floor; `step_size` is the error [rad] of the simulator's time step by joint."""
     groups = aligned_repeats(recording.trials)
     sensor = sensor_noise(recording)
     variance = np.maximum(sensor, LEAST) ** 2  # repeats of a simulation differ by less than its sensor's noise
@@ -226,7 +226,7 @@ SMALLEST = 1e-6  # part of the range of motion
 
 
 def sensor_noise(recording: Recording) -> Array:
-    """White part (n,) of the position signals [rad], robust against jumps; at least what the owner states of it."""
+    """Return the white part (n,) of the position signals [rad], robust against jumps; at least what is stated."""
     sensors = recording.description.sensors
     signals = [[t.position[t.valid, j] for t in recording.trials] for j in range(len(recording.joints))]
     steps = [sensors.position_resolution or reading_step(np.concatenate(one)) for one in signals]

@@ -58,7 +58,7 @@ def latest_direction(velocity: Array) -> Array:
 
 
 def after_reversal(velocity: Array, step: float) -> Mask:
-    """Samples within 0.2 s after the velocity took the other sign; a standstill in between does not count as one."""
+    """Return the samples within 0.2 s after the velocity changed its sign; a standstill in between is no change."""
     sign = np.where(np.abs(velocity) > MOVING, np.sign(velocity), 0.0)
     moving = np.flatnonzero(sign)
     turns = moving[1:][sign[moving[1:]] != sign[moving[:-1]]]

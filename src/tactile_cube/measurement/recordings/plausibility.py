@@ -172,7 +172,7 @@ def check_roles(columns: TrialColumns, joints: tuple[str, ...], path: Path) -> l
 
 
 def without_wraps(columns: TrialColumns, joints: list[RigJoint], path: Path) -> tuple[TrialColumns, list[str]]:
-    """Positions and commands [rad] without jumps by a whole turn from one row to the next, and warnings of them."""
+    """Return positions and commands [rad] without jumps by whole turns between rows, and warnings of them."""
     turning, warnings, unwrapped = [not joint.prismatic for joint in joints], [], {}
     for key in ("position", "command"):
         values = getattr(columns, key)

@@ -71,7 +71,7 @@ class Recording:
         return 1.0 / self.rate
 
     def substeps(self, longest: float) -> int:
-        """Simulation steps from sample to sample: none longer than `longest` [s], nor than the controller's period."""
+        """Return the simulation steps a sample: none longer than `longest` [s], nor than the controller's period."""
         control = self.description.controller.rate_hz or self.rate
         return max(1, math.ceil(self.step / longest - 1e-6), round(control / self.rate))
 

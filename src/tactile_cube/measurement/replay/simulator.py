@@ -293,7 +293,7 @@ class Simulator:
 
 
 def sensors(recording: Recording) -> tuple[Array, Array]:
-    """Noise (n,) of the position sensors [rad], and how well the speed at a trial's start is to be read [rad/s]."""
+    """Return the position sensors' noise (n,) [rad], and how well a trial's initial speed is to be read [rad/s]."""
     return np.maximum(sensor_noise(recording), LEAST), START_SPEED * np.array(
         [one.of("rad/s") for one in joint_scales(recording)]
     )

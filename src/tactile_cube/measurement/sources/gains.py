@@ -64,7 +64,7 @@ def _motion(trial: TrialTable) -> Array:
 
 
 def nonnegative_fit(columns: Mapping[str, Array], values: Array) -> tuple[dict[str, float], float]:
-    """Coefficients of columns (n,), none negative, and the error (2-norm) that they leave: inf of what is no number."""
+    """Return nonnegative coefficients of columns (n,) and the error (2-norm) that they leave: inf without a number."""
     table = np.stack(list(columns.values()), axis=1)
     sizes = np.maximum(np.abs(table).max(axis=0), 1e-12)
     if not np.isfinite(table / sizes).all() or not np.isfinite(values).all():

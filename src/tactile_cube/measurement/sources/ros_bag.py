@@ -95,7 +95,7 @@ def _messages(path: Path, topics: tuple[str, str]) -> dict[str, list[tuple[float
 
 
 def _decoded(stream: BinaryIO, topics: Sequence[str]) -> Iterator[tuple[str, float, Any]]:
-    """Topic, time [s] by the header's stamp where there is one, else of logging, and content of ROS 2 messages."""
+    """Yield topic, time [s] by the header's stamp, or without one of logging, and content of ROS 2 messages."""
     from mcap.records import Channel, Chunk, Message, Schema
     from mcap.stream_reader import StreamReader, breakup_chunk
     from mcap_ros2.decoder import DecoderFactory

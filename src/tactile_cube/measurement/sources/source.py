@@ -25,7 +25,7 @@ class Source(Protocol):
     """Makes recordings."""
 
     def recordings(self, seed: int) -> dict[str, RecordingTables]:
-        """Sub-folder -> recording; `""` is the recording itself, `validation` what identification must not see."""
+        """Return sub-folder -> recording; `""` is the recording, `validation` what identification must not see."""
         ...
 
 

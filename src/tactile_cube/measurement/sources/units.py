@@ -96,7 +96,7 @@ def chosen_unit(said: str | int | None, name: str, units: Mapping[str, float], k
 
 
 def time_unit(said: str | None, name: str, time: Array) -> Unit:
-    """Unit of time stamps; steps of more than 0.1 cannot be seconds, of more than 100 no milliseconds, and so on."""
+    """Return the unit of time stamps; steps of more than 0.1 cannot be seconds, of more than 100 no milliseconds."""
     chosen = chosen_unit(said, name, TIME_UNITS, "time_unit")
     steps = np.diff(time)
     step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
