@@ -56,7 +56,7 @@ def write_npz(path: Path, arrays: Mapping[str, Any], compressed: bool = True) ->
 
     content = io.BytesIO()
     (np.savez_compressed if compressed else np.savez)(content, allow_pickle=False, **arrays)
-    write_whole(path, content.getbuffer())
+    write_whole(path, content.getvalue())
 
 
 @contextlib.contextmanager

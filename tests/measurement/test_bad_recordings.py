@@ -293,7 +293,8 @@ def test_a_place_without_a_regular_file_in_the_folder_is_refused(tmp_path: Path,
     else:
         os.mkfifo(folder / name) if way == "pipe" else os.mknod(folder / name, stat.S_IFSOCK | 0o600)
     message = error_of(folder)
-    assert said.get(way, "is no name of a file") in message
+    loop = ("is no name of a file", "Too many levels of symbolic links")  # until Python 3.12, and later
+    assert any(one in message for one in ([said[way]] if way in said else loop))
     assert name in message
 
 

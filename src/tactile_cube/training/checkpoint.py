@@ -44,7 +44,7 @@ class Checkpoints:
         try:
             stream = io.BytesIO()
             torch.save(state, stream)
-            content = stream.getbuffer()
+            content = stream.getvalue()  # a view of it may crash the garbage collector of some CPython 3.12
             write_whole(aside, HEAD, hashlib.sha256(content).hexdigest().encode(), b"\n", content)
             if path.exists():
                 path.replace(self.folder / BEFORE)

@@ -292,7 +292,7 @@ def write_sweep_curves(runs: Mapping[str, Mapping[int, Curve]], path: Path, titl
 def _write(figure: Figure, path: Path) -> None:
     picture = BytesIO()
     figure.savefig(picture, format=path.suffix.removeprefix("."), dpi=110)
-    write_whole(path, picture.getbuffer())
+    write_whole(path, picture.getvalue())
 
 
 def _mark_regrasping(axis: Axes) -> None:
