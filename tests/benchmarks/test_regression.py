@@ -7,6 +7,7 @@ from pathlib import Path
 
 from benchmarks.blind.generator import write
 from benchmarks.regression.__main__ import draws
+from benchmarks.regression.recall import holds
 
 ROUNDS = Path(__file__).parents[2] / "docs" / "results" / "data" / "rounds"
 
@@ -24,3 +25,14 @@ def test_every_draw_says_what_its_generator_takes_and_what_is_expected() -> None
     for draw in draws():
         assert set(draw) - {"expects"} <= words
         assert draw["expects"] in ("right", "acceptable")
+
+
+def test_recall_counts_a_set_only_at_the_true_joints_and_without_other_laws() -> None:
+    hidden = [
+        {"name": "backlash", "joints": ["a"], "any_joint": False, "names": ["backlash", "elasticity"]},
+        {"name": "payload", "joints": ["b"], "any_joint": True},
+    ]
+    assert holds("elasticity(compliance)@a & payload(mass, distance)@a", hidden) == "true"
+    assert holds("backlash(play)@b & payload(mass)@b", hidden) == ""
+    assert holds("backlash(play)@a", hidden) == ""
+    assert holds("backlash(play)@a & payload(mass)@b & cogging(7 values)@a", hidden) == "larger"

@@ -74,7 +74,7 @@ def term(sign: int, scaled: bool = False) -> Callable[[Callable[[Step], float]],
 
 @term(+1)
 def spin(step: Step) -> float:
-    """Return the rotation as rewarded, at most `limit` a step [rad]. Source: paper, section II; website (clip)."""
+    """Return the rotation in the rewarded direction, at most `limit` a step [rad]. Source: paper; website (clip)."""
     return min(step.direction * (step.after.theta - step.before.theta), step.limit)
 
 

@@ -27,7 +27,7 @@ class WorldsEnv(EnvBase):  # type: ignore[misc]
     """
 
     def __init__(self, tasks: Sequence[RotationEnv]) -> None:
-        """Return the host `tasks`."""
+        """Host `tasks`."""
         super().__init__(device="cpu", batch_size=[len(tasks)])
         self.tasks = list(tasks)
         self.final_conditions = self.tasks[0].task.conditions()

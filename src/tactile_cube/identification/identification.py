@@ -12,11 +12,12 @@ from tactile_cube.errors import InputError
 from tactile_cube.identification.disturbances import in_time
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit, noise_inflation
 from tactile_cube.identification.fitting.problem import Problem
-from tactile_cube.identification.fitting.resolution import Fitted, final_fit, resolved
+from tactile_cube.identification.fitting.resolution import Fitted, resolved
 from tactile_cube.identification.search.candidates import candidates
 from tactile_cube.identification.search.evidence import Judgement
 from tactile_cube.identification.search.residual_starts import residual_candidates
 from tactile_cube.identification.search.search import Search
+from tactile_cube.identification.verdict import final_model
 from tactile_cube.measurement.comparing.error import ErrorSummary, free_run_error
 from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor, noise_with_links
 from tactile_cube.measurement.recordings.recording import Recording
@@ -93,10 +94,7 @@ def identify_effects(
         judgement = search.judged(current.model)
         stages[f"+ {label}"] = judgement.model
         say(f"fitted {label}")
-    every, unknowns = Problem(search.shooting, search.all_windows), search.unknowns(current.model)
-    fitted = final_fit(every, current.model, unknowns)
-    if search.free_runs.worse(fitted.model, current.model):
-        fitted = final_fit(every, current.model, unknowns, iterations=0)
+    fitted = final_model(search, Problem(search.shooting, search.all_windows), current.model)
     last = list(stages)[-1]
     stages[last] = fitted.model.with_offsets(stages[last].offsets)
     say("simulating the held-out trials")

@@ -23,6 +23,7 @@ from tactile_cube.identification.search.findings import Findings
 from tactile_cube.identification.search.residual_shape import Shape, black_box, missing_torques, shapes
 from tactile_cube.identification.search.search import Search
 from tactile_cube.measurement.comparing.noise_floor import NoiseFloor
+from tactile_cube.measurement.replay.model import Model
 
 SHOWN_SHAPES = 6
 Kind = Literal["adequate", "missing_effect", "ambiguous", "partly_explained", "unknown_effect"]
@@ -112,6 +113,15 @@ class Unexplained:
         return self.explained / together if together > 0.0 else 0.0
 
 
+def final_model(search: Search, problem: Problem, model: Model) -> Fitted:
+    """Refit a model on all fitted trials, with intervals; keep its values if held-out trials get worse."""
+    unknowns = search.unknowns(model)
+    found = final_fit(problem, model, unknowns)
+    if search.free_runs.worse(found.model, model):
+        return final_fit(problem, model, unknowns, iterations=0)
+    return found
+
+
 class Simulations:
     """Cached checks of an explanation beside its fit: final fit and unexplained torque."""
 
@@ -121,13 +131,9 @@ class Simulations:
         self._final: dict[str, Fitted] = {}
 
     def final(self, one: Explanation) -> Fitted:
-        """Refit an explanation on all fitted trials, with intervals; keep its values if held-out trials get worse."""
+        """Return the final model of an explanation, see `final_model`."""
         if one.label not in self._final:
-            unknowns = self.search.unknowns(one.fit.model)
-            found = final_fit(self.problem, one.fit.model, unknowns)
-            if self.search.free_runs.worse(found.model, one.fit.model):
-                found = final_fit(self.problem, one.fit.model, unknowns, iterations=0)
-            self._final[one.label] = found
+            self._final[one.label] = final_model(self.search, self.problem, one.fit.model)
         return self._final[one.label]
 
     def unexplained(self, one: Explanation, beside_base: bool = False) -> list[Unexplained]:

@@ -198,7 +198,7 @@ def _known_force(rig: Recording, number: int, rng: np.random.Generator) -> list[
 
 
 def _clamped(rig: Recording, number: int, rng: np.random.Generator) -> list[BenchTrial]:
-    """Return the links held still while every command sweeps about the configuration: the drive alone gives way."""
+    """Return a trial with links held still, every command sweeping about a configuration: the drive alone yields."""
     sweep = SWEEP * np.sin(2 * np.pi * _time(rig, SWEEP_TIME) / SWEEP_TIME)
     file = f"trials/clamped_{number}.parquet"
     entry = TrialEntry(file=file, initialisation=number, kind="clamped", clamped=True)

@@ -93,7 +93,7 @@ class FingerExploration(Transform):  # type: ignore[misc]
         fingers: int = 4,
         joints_per_finger: int = 3,
     ) -> None:
-        """Return the explore as `exploration` says; demonstrations play `gaits`, actions (gaits, steps, joints)."""
+        """Explore as `exploration` says; demonstrations play `gaits`, actions (gaits, steps, joints)."""
         super().__init__(out_keys=["exploring", "demonstrated", "action_taken"])
         self.settings = exploration
         self._groups, self._per_finger = finger_groups(fingers, exploration.single), joints_per_finger

@@ -201,7 +201,7 @@ def _derivatives(x: Array, step: float, time: float) -> tuple[Array, Array, Arra
 
 
 def _inertia(problem: Problem, model: Model, measured: Array) -> Array:
-    """Return the diagonal (n,) of the joint-space inertia at the mean posture [kg m^2]."""
+    """Return the diagonal (n,) of the joint-space inertia at the mean configuration [kg m^2]."""
     posture = measured.reshape(-1, measured.shape[2]).mean(axis=0)
     mass = problem.shooting.tree.actuated_mass_matrix(posture)
     return np.asarray(np.diag(mass) + model.constants["reflected_inertia"])

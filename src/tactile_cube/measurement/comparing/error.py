@@ -35,7 +35,7 @@ def residuals(trials: Sequence[Trial], simulated: Sequence[Array]) -> list[Array
 
 
 def raw_residuals(trials: Sequence[Trial], simulated: Sequence[Array]) -> list[Array]:
-    """Return measured - simulated (n, joints) [rad] of each trial; nan where a sample was bridged."""
+    """Return measured - simulated (n, joints) [rad] of each trial, nothing removed; nan where bridged."""
     return [
         np.where(trial.valid[:, None], trial.position - positions, np.nan)
         for trial, positions in zip(trials, simulated, strict=True)

@@ -114,7 +114,7 @@ class Windows:
         )
 
     def by_segment(self, values: Array) -> Array:
-        """Return the reshape (S, K segment, n) to (S K, segment n)."""
+        """Reshape (S, K segment, n) to (S K, segment n)."""
         return values.reshape(len(self) * self.segments, -1)
 
 

@@ -232,7 +232,7 @@ def _json(path: Path) -> Log:
 
 
 def _flat(data: Any, prefix: str = "") -> Iterator[tuple[str, NDArray[Any]]]:
-    """Return arrays of nested objects, named by their path; a list of objects is a table without a prefix."""
+    """Return arrays of nested objects, named by their path; columns of a list of objects have none."""
     if hasattr(data, "_fieldnames"):
         data = {name: getattr(data, name) for name in data._fieldnames}
     if isinstance(data, list) and data and all(isinstance(row, dict) for row in data):
