@@ -15,12 +15,12 @@ Function = TypeVar("Function", bound=Callable[..., object])
 
 
 def compiled(function: Function) -> Function:
-    """Numba's nopython compilation: IEEE arithmetic (no fast-math, so results are reproducible bit for bit), no GIL."""
+    """Compile by Numba without Python objects: IEEE arithmetic (no fast-math: the same bits every time), no GIL."""
     return cast(Function, numba.njit(error_model="numpy", nogil=True)(function))
 
 
 def compiled_once(function: Function) -> Function:
-    """As `compiled`, kept on disk for the next process; only for functions that call nothing outside their file."""
+    """Compile as `compiled` and keep it on disk; only for functions that call nothing outside their file."""
     return cast(Function, numba.njit(error_model="numpy", nogil=True, cache=True)(function))
 
 
@@ -33,7 +33,7 @@ def _as_pointer(context: Any, address: Any) -> Any:
 
 
 def borrowed(array: Array) -> Array:
-    """The same flat float64 array without an owner: slicing it in compiled code then counts no references.
+    """Return the same flat float64 array without an owner: slicing it in compiled code then counts no references.
 
     Counting is atomic and costs more than the arithmetic of a small slice. The caller keeps the array alive.
 
@@ -46,7 +46,7 @@ def borrowed(array: Array) -> Array:
 
 
 def shaped_view(array: Array, start: int, shape: tuple[int, ...]) -> Array:
-    """The numbers from `start` on as an array of another shape; numpy's reshape is an outside call in compiled code.
+    """Return the numbers from `start` on in another shape; numpy's reshape is an outside call in compiled code.
 
     In compiled code nothing is checked: the caller keeps the array alive, contiguous and long enough.
     """

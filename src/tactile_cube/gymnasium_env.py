@@ -90,7 +90,7 @@ class GymnasiumRotation(gymnasium.Env[Observation, Observation]):
         return data["observation"][0].numpy().copy(), float(data["reward"]), *ends, info
 
     def render(self) -> Picture | None:
-        """Hand and cube from the side and from below (256, 512, 3), with render_mode "rgb_array"; else None."""
+        """Return hand and cube from the side and from below (256, 512, 3) with render_mode "rgb_array", else None."""
         if self.render_mode is None:
             return None
         task: RotationEnv = self._env.base_env.tasks[0]

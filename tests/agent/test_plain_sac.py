@@ -1,6 +1,8 @@
 """The plain loss against TorchRL's SACLoss, and what it adds."""
 
 import io
+import re
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -177,3 +179,19 @@ def test_cuda_gives_the_losses_of_the_cpu() -> None:
     on_cpu = cpu.losses(batch)["loss_qvalue"]
     torch.testing.assert_close(gpu.losses(batch.to("cuda"))["loss_qvalue"].cpu(), on_cpu, rtol=1e-3, atol=1e-4)
     assert torch.isfinite(gpu.update(random_batch())["critic_loss"])
+
+
+def test_the_loss_that_the_guide_writes_is_added() -> None:
+    guide = (Path(__file__).parents[2] / "docs" / "learn.md").read_text(encoding="utf-8")
+    block = next(one for one in re.findall(r"```python\n(.*?)```", guide, flags=re.DOTALL) if "class MySac" in one)
+    written: dict[str, Any] = {}
+    exec(block, written)
+    batch = random_batch()
+    plain, mine = made(PlainSac), made(written["MySac"])
+    torch.manual_seed(5)
+    before = plain.losses(batch)
+    torch.manual_seed(5)
+    after = mine.losses(batch)
+    added = 0.01 * plain.loss.actor.sample(batch["observation"]).likeliest.square().mean()
+    assert torch.isclose(after["loss_actor"], before["loss_actor"] + added)
+    assert torch.equal(after["loss_qvalue"], before["loss_qvalue"])

@@ -99,7 +99,7 @@ class Agent(ABC):
         """Make `loss` on the device."""
 
     def losses(self, batch: TensorDictBase) -> Mapping[str, Tensor]:
-        """loss_qvalue, loss_actor and loss_alpha, to be summed; alpha, entropy and value, the mean Q of own actions."""
+        """Return loss_qvalue, loss_actor, loss_alpha, to be summed; alpha, entropy, value (mean Q of own actions)."""
         found: Mapping[str, Tensor] = self.loss(batch)
         return found
 

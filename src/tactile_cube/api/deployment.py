@@ -176,7 +176,7 @@ def deploy(
 
 
 def run_deployment(job: Job, say: Say, folder: Path | None = None) -> DeploymentResult:
-    """Home, run, stop, as often as the job says; every run with a new loop.
+    """Go home, run and stop, as often as the job says; every run has a new loop.
 
     Args:
         job: what to do.

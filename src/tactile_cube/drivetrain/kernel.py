@@ -181,7 +181,7 @@ from tactile_cube.compiled import compiled
 
 
 def kernel_source(topology: Topology, effects: Sequence[type[Effect]], layout: MemoryLayout) -> str:
-    """Text of a module with C, N, n, the topology, the offsets into the memory and a function for each stage."""
+    """Return the text of a module with C, N, n, the topology, the memory's offsets and a function for each stage."""
     laws = [
         f'{law}_{index} = compiled(import_module("{effect.__module__}").{effect.__qualname__}.{law})'
         for index, effect in enumerate(effects)
@@ -215,7 +215,7 @@ def _stage(stage: Stage, effects: Sequence[type[Effect]], layout: MemoryLayout) 
 
 
 def _ahead(effects: Sequence[type[Effect]], layout: MemoryLayout) -> str:
-    """Laws of the position sensor that can be asked before the torque is known: remembering nothing, or made for it."""
+    """Return the sensor laws that are known before the torque: those without memory, or made for it."""
     lines = []
     for index, effect in enumerate(effects):
         if effect.defines("ahead_law"):

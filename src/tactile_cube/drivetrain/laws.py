@@ -20,7 +20,7 @@ Integers = npt.NDArray[np.int64]
 
 @compiled
 def low_pass(filtered: float, goal: float, time_constant: float, dt: float) -> float:
-    """One exact step of the first-order low-pass T_s q_f' = q_n - q_f; T_s = 0 lets the goal through.
+    """Advance the first-order low-pass T_s q_f' = q_n - q_f exactly by a step; T_s = 0 lets the goal through.
 
     Source: Sievers, Pitz, Bauml (ICRA 2022), section II-B ("cut-off 1/T_s").
     """
@@ -31,13 +31,13 @@ def low_pass(filtered: float, goal: float, time_constant: float, dt: float) -> f
 
 @compiled
 def limit_rate(previous: float, target: float, rate: float, dt: float) -> float:
-    """The target, at most `rate` [rad/s] away from where it was one step before."""
+    """Return the target, at most `rate` [rad/s] away from where it was one step before."""
     return min(max(target, previous - rate * dt), previous + rate * dt)
 
 
 @compiled
 def limit_torque(target: float, q_m: float, v: float, kp: float, kd: float, limit: float) -> float:
-    """The target nearest to the wanted one for which K_P (q_d - q_m) - K_D dq stays within `limit` [N m].
+    """Return the target nearest to the wanted one with K_P (q_d - q_m) - K_D dq within `limit` [N m].
 
     The controller is inverted approximately: with q_m as last measured.
     """
@@ -50,7 +50,7 @@ def limit_torque(target: float, q_m: float, v: float, kp: float, kd: float, limi
 def impedance_torque(
     command: float, q: float, v: float, kp: float, kd: float, compliance: float, extra: float
 ) -> float:
-    """Torque tau = K_P (q_d - q_m) - K_D dq [N m] with q_m = q + compliance * tau + extra, solved for tau.
+    """Return tau = K_P (q_d - q_m) - K_D dq [N m], solved for tau with q_m = q + compliance * tau + extra.
 
     The loop is algebraic: iterating it would add a delay of one step, the closed form does not.
     Source: Sievers, Pitz, Bauml (ICRA 2022), eq. (1) and (2).
@@ -69,7 +69,7 @@ def impedance_torque(
 
 @compiled
 def expand(follow: Integers, ratio: Array, offset: Array, q: Array, v: Array, q_all: Array, v_all: Array) -> None:
-    """Positions and speeds of all dofs (N,) from those of the actuated joints (n,)."""
+    """Return positions and speeds of all dofs (N,) from those of the actuated joints (n,)."""
     for k in range(len(follow)):
         q_all[k] = ratio[k] * q[follow[k]] + offset[k]
         v_all[k] = ratio[k] * v[follow[k]]
@@ -79,7 +79,7 @@ def expand(follow: Integers, ratio: Array, offset: Array, q: Array, v: Array, q_
 def reduce_equations(
     follow: Integers, ratio: Array, M: Array, h: Array, rotor: Array, M_joint: Array, h_joint: Array
 ) -> None:
-    """J^T M J + diag(rotor) (n, n) and J^T h (n,): the reflected inertia enters in joint space."""
+    """Return J^T M J + diag(rotor) (n, n) and J^T h (n,): the reflected inertia enters in joint space."""
     M_joint[:] = 0.0
     h_joint[:] = 0.0
     for k in range(len(follow)):
@@ -94,7 +94,7 @@ def reduce_equations(
 def estimate_contact(
     follow: Integers, ratio: Array, M: Array, h: Array, torque: Array, acceleration: Array, limit: float, contact: Array
 ) -> None:
-    """J^T c with c = M a + h - tau of the previous step: what else than our torque moved the joints.
+    """Return J^T c, c = M a + h - tau of the previous step: what else than the drives' torque moved the joints.
 
     Clipped at `limit` [N m], because an impact within one step is not a torque that lasts.
     """
@@ -119,7 +119,7 @@ def link_torques(
     contact: Array,
     torque: Array,
 ) -> None:
-    """Torques (N,) under which the engine's links, inertia M and bias h, get the wanted joint accelerations (n,).
+    """Return torques (N,) that give the engine's links (inertia M, bias h) the wanted joint accelerations (n,).
 
     `contact` (n,) is taken off the actuated joints, the dofs `leader` (n,): the engine's solver adds it itself.
     """
@@ -165,7 +165,7 @@ SMALLEST_PIVOT = 1e-14
 def solve_speeds(
     M: Array, b: Array, limit: Array, grip: Array, v: Array, side: Array, factor: Array, trial: Array
 ) -> None:
-    """Speeds after a step under dry friction.
+    """Return the speeds after a step under dry friction.
 
     Guesses which joints move and to which side, solves for their speeds, and accepts if the guess agrees with the
     result; otherwise soft-thresholded coordinate descent (which converges from anywhere), run twice as long each time,
@@ -199,7 +199,7 @@ def solve_speeds(
 
 @compiled
 def _side(v: float, limit: float, grip: float) -> float:
-    """The side to which a joint moves, 0 if it sticks."""
+    """Return the side to which a joint moves, 0 if it sticks."""
     return 0.0 if abs(v) * grip < limit and (grip > 0.0 or v == 0.0) else np.sign(v)
 
 
@@ -210,7 +210,7 @@ def _stands(limit: float, grip: float, side: float) -> bool:
 
 @compiled
 def _solve_moving(M: Array, b: Array, limit: Array, grip: Array, side: Array, factor: Array, v: Array) -> None:
-    """Speeds of the joints that move, under full friction against `side`; the others stand (L D L^T).
+    """Return the speeds of moving joints, under full friction against `side`; the others stand (L D L^T).
 
     A standing joint's row and column are those of the identity, its right side zero.
     """
@@ -236,7 +236,7 @@ def _solve_moving(M: Array, b: Array, limit: Array, grip: Array, side: Array, fa
 
 @compiled
 def _agrees(M: Array, b: Array, limit: Array, grip: Array, side: Array, v: Array) -> bool:
-    """Whether moving joints move to their side and sticking ones are held within their friction."""
+    """Return whether moving joints move to their side and sticking ones are held within their friction."""
     for i in range(len(v)):
         if limit[i] <= 0.0:
             continue
@@ -257,7 +257,7 @@ def _agrees(M: Array, b: Array, limit: Array, grip: Array, side: Array, v: Array
 
 @compiled
 def _descend(M: Array, b: Array, limit: Array, grip: Array, v: Array) -> None:
-    """One sweep of coordinate descent: each joint in turn takes its best speed, the others held."""
+    """Descend once along each coordinate: each joint in turn takes its best speed, the others held."""
     for i in range(len(v)):
         push = b[i]
         for j in range(len(v)):

@@ -78,7 +78,7 @@ MOST_CORNERS = 64
 
 
 def damping_number(tree: RigidBodyTree, constants: DrivetrainConstants, dt: float, q: Array) -> float:
-    """Stability number dt * eig_max((M(q) + I)^-1 K_D), with the damping at the joint; explicit steps need less than 2.
+    """Return dt * eig_max((M(q) + I)^-1 K_D), with the damping at the joint; explicit steps need less than 2.
 
     Source: hand.md's trial on this hand; explicit Euler on M v' = -K_D v.
     """

@@ -98,7 +98,7 @@ def tilt(step: Step) -> float:
 
 @term(-1)
 def proximal(step: Step) -> float:
-    """Sum over the fingers of q1^4 [rad^4]: keeps the fingers from twisting."""
+    """Return the sum over the fingers of q1^4 [rad^4], which keeps them from twisting."""
     return sum(q**4 for q in step.proximal_angles)
 
 
@@ -161,7 +161,7 @@ def links(step: Step) -> float:
 
 @term(-1)
 def link_force(step: Step) -> float:
-    """Share of these links in the normal force; 0 without any."""
+    """Return the share of these links in the normal force; 0 without any."""
     total = float(step.forces.sum())
     return float(step.forces[0].sum()) / total if total > 0.0 else 0.0
 

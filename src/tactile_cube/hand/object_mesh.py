@@ -239,7 +239,7 @@ def tip_centres(shape: ObjectShape, side: Array, half: Array, radius: float, gap
 
 
 def _on_face(side: Array, half: Array) -> tuple[Array, Array]:
-    """Outward normal (3,) of the face that a ray from the middle meets, and a grid on it, nearest to the ray first.
+    """Return the normal (3,) of the face that a ray from the middle meets, and a grid on it, nearest to the ray first.
 
     The grid (n, 3) [m] is relative to the face's middle.
     """

@@ -127,7 +127,7 @@ class RigidBodyTree:
         return M, h
 
     def inverse_dynamics(self, q: Array, v: Array, a: Array, gravity: Array) -> Array:
-        """Torques (samples, n) [N m] of the drives that move actuated joints by q, v, a (samples, n), rotors apart."""
+        """Return torques (samples, n) [N m] of the drives for q, v, a (samples, n) of actuated joints, rotors apart."""
         J = self.coupling
         taken = np.empty_like(q)
         for k, (position, speed) in enumerate(zip(q, v, strict=True)):
@@ -136,7 +136,7 @@ class RigidBodyTree:
         return taken
 
     def actuated_mass_matrix(self, q: Array) -> Array:
-        """J^T M J (n, n) [kg m^2] at actuated positions q (n,): the inertia that the drives feel, rotors apart."""
+        """Return J^T M J (n, n) [kg m^2] at actuated positions q (n,): the inertia that drives feel, rotors apart."""
         M, _ = self.equations(self.expand(q), np.zeros(self.dofs), np.zeros(3))
         J = self.coupling
         return np.asarray(J.T @ M @ J)

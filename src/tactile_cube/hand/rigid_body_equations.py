@@ -56,19 +56,19 @@ def _cross(a: Vector, b: Vector) -> Vector:
 
 @compiled_once
 def _rotated(work: Array, row: int, vector: Vector) -> Vector:
-    """A link's vector in base coordinates."""
+    """Return a link's vector in base coordinates."""
     return _dot(_at(work, row, 0), vector), _dot(_at(work, row, 3), vector), _dot(_at(work, row, 6), vector)
 
 
 @compiled_once
 def _carried(spin: Vector, spin_rate: Vector, arm: Vector) -> Vector:
-    """Acceleration of a point at `arm` from a turning origin, relative to it: w' x r + w x (w x r)."""
+    """Return the acceleration of a point at `arm` from a turning origin, relative to it: w' x r + w x (w x r)."""
     return _add(_cross(spin_rate, arm), _cross(spin, _cross(spin, arm)))
 
 
 @compiled_once
 def _turn(work: Array, before: int, row: int, placement: Array, axis: Vector, angle: float) -> None:
-    """Orientation of a link, parent * placement * rotation about `axis` (Rodrigues), and its axis, in the base."""
+    """Return a link's orientation, parent * placement * rotation about `axis` (Rodrigues), and axis, in the base."""
     co, si = (cos(angle), sin(angle)) if angle != 0.0 else (1.0, 0.0)
     for i in range(3):
         p = _at(work, before, 3 * i)
@@ -83,7 +83,7 @@ def _turn(work: Array, before: int, row: int, placement: Array, axis: Vector, an
 
 @compiled_once
 def _move(work: Array, before: int, row: int, shift: Vector, slides: int, q: float, v: float) -> None:
-    """Origin, spin and acceleration at zero joint accelerations of a link from those of its parent."""
+    """Return origin, spin and acceleration at zero joint accelerations of a link from those of its parent."""
     axis, spin, spin_rate = _at(work, row, AXIS), _at(work, before, SPIN), _at(work, before, SPIN_RATE)
     arm = _rotated(work, before, shift)
     swung = _scaled(_cross(spin, axis), v)
@@ -100,7 +100,7 @@ def _move(work: Array, before: int, row: int, shift: Vector, slides: int, q: flo
 
 @compiled_once
 def _inertia_times(work: Array, row: int, inertia: Array, vector: Vector) -> Vector:
-    """R I R^T applied to a vector in base coordinates."""
+    """Return R I R^T applied to a vector in base coordinates."""
     x, y, z = _at(work, row, 0), _at(work, row, 3), _at(work, row, 6)
     local = _add(_add(_scaled(x, vector[0]), _scaled(y, vector[1])), _scaled(z, vector[2]))
     a, b, c = _at(inertia, 0, 0), _at(inertia, 1, 0), _at(inertia, 2, 0)
@@ -153,7 +153,7 @@ def mass_matrix_and_bias(
     M: Array,
     h: Array,
 ) -> None:
-    """Mass matrix M (N, N) and bias h (N,) (Coriolis, centrifugal, gravity) of all dofs, written: M a + h = tau.
+    """Return M (N, N) and bias h (N,) (Coriolis, centrifugal, gravity) of all dofs, written: M a + h = tau.
 
     At positions q and velocities v (N,), gravity (3,) in the base frame; parent to inertia as in `RigidBodyTree`.
     `work` (N + 1, WORK_COLUMNS) is scratch; afterwards it holds the links' poses and spins.

@@ -23,7 +23,7 @@ from tactile_cube.untrusted_file import read_text
 
 
 def read_shapes(robot: ElementTree.Element, tree: RigidBodyTree, carrier: int, turn: Array) -> list[CollisionShape]:
-    """Collision shapes of all links that move with dof `carrier` (-1: with none), seen from axes (3, 3) in its frame.
+    """Read the collision shapes that move with dof `carrier` (-1: with none), seen from axes (3, 3) in its frame.
 
     The files that the robot, of which `tree` was read, names have absolute names.
 

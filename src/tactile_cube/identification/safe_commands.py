@@ -184,7 +184,7 @@ def _waves(time: Array, recording: Recording, rng: np.random.Generator) -> dict[
     levels = rng.uniform(-0.9, 0.9, (round(float(time[-1, 0])) + 1, joints))
 
     def triangle(turns: Array) -> Array:
-        """With the signs and peaks of a sine."""
+        """Return a triangle wave with the signs and peaks of a sine."""
         turns = turns + phases / (2.0 * np.pi) - 0.25
         return np.asarray(1.0 - 4.0 * np.abs(turns - np.floor(turns + 0.5)))
 
@@ -301,7 +301,7 @@ class PossibleMotions:
 
 
 def trials_from_rest(recording: Recording, kind: str, commands: Array) -> list[Trial]:
-    """Trials of these commands that begin at rest, one for each start that the recording has shown, the last one last.
+    """Return trials of these commands from rest, one for each start that the recording has shown, the last one last.
 
     A joint whose position is controlled begins where its first command puts it, under the joint offsets of each
     initialisation; one that is driven by torque where any of the trials began.

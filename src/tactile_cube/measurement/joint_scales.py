@@ -75,7 +75,7 @@ def _quantile(rows: list[Array], share: float) -> Array:
 
 
 def _torques(recording: Recording, window: float) -> list[Array]:
-    """Size of the torques that the controller asks for (T, n) in each trial; a window of zero leaves damping out."""
+    """Return the size of the controller's torques (T, n) in each trial; a window of zero leaves damping out."""
     if recording.torque_controlled:
         return [np.abs(trial.command) for trial in recording.trials]
     kp, kd, limit = recording.gains.kp, recording.gains.kd, recording.gains.torque_limit

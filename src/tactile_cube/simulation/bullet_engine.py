@@ -267,7 +267,7 @@ class BulletEngine:
         return self._cube_shape
 
     def _set_links(self, constants: EpisodeConstants) -> None:
-        """Friction of the links, whose factors Bullet multiplies with the object's, and inertia about their joints."""
+        """Set the links' friction, which Bullet multiplies with the object's, and their inertia about their joints."""
         for body, inertias, spins in zip(self.fingers, self._inertias, self._drive.view("spin_inertia"), strict=True):
             for link, (diagonal, spin) in enumerate(zip(inertias, spins, strict=True)):
                 tip, spinning = link == self._links[-1], list(diagonal)

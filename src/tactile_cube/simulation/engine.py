@@ -307,7 +307,7 @@ def spin_inertia(hand: Hand, shares: Array, reflected_inertia: Array) -> Array:
 
 
 def spin_shares(tree: RigidBodyTree) -> Array:
-    """Share of a joint's reflected inertia that its link spins with (links,).
+    """Return the share of a joint's reflected inertia that its link spins with (links,).
 
     Joints in a row with parallel axes share it, for all further links turn with the first of them: three of them take
     1/2, 1/3 and 1/6.

@@ -135,7 +135,7 @@ class HandSpec:
                 joint.armature = view("armature")[k, i]
 
     def _set_objects(self, constants: EpisodeConstants) -> None:
-        """Size and mass of the cube; without a table it lies too far away to be met."""
+        """Set size and mass of the cube; without a table it lies too far away to be met."""
         body, shape = self._cube
         size, mass = np.asarray(constants.cube_size), constants.cube_mass
         kind = constants.object_shape

@@ -193,7 +193,7 @@ class World:
         return self._engine.contacts()
 
     def normal_forces(self) -> Array:
-        """Normal force on the object of each finger's other links and of its tip (2, fingers) [N], of `contacts`."""
+        """Return the normal force on the object of each finger's other links and of its tip (2, fingers) [N]."""
         return self._engine.normal_forces()
 
     # --- parts of reset and step ---------------------------------------------------------------------------------
@@ -226,7 +226,7 @@ def _make_engine(hand: Hand, options: SimulationOptions, drive: HandDrive) -> En
 
 
 def random_wrench(constants: EpisodeConstants, time: float) -> Array | None:
-    """Random force and torque on the cube (6,) [N, N m] at a time [s] of the episode, or None without disturbances.
+    """Draw force and torque on the cube (6,) [N, N m] at a time [s] of the episode, or None without disturbances.
 
     Sizes and directions are redrawn at intervals, a function of the episode's seed and the time alone.
     Source: the authors' follow-up (ICRA 2023 page): N(0.04, 0.008) N, N(0.002, 0.0004) N m, every 0.5 s.

@@ -16,7 +16,7 @@ from tactile_cube.transforms.disturbances import reset_mask
 
 
 def finger_groups(fingers: int, single: bool = False) -> Tensor:
-    """Fingers that move together (groups, fingers): each alone, every second one where there are four, all (twice).
+    """Return fingers that move together (groups, fingers): each alone, every second one of four, all (twice).
 
     Of four fingers those are the opposing pairs: ring and fore, middle and thumb. With `single` each alone is all.
     """

@@ -64,7 +64,7 @@ def episode_blueprint(
 
 
 def _scene(root: str, name: str, hand_name: str) -> rrb.View:
-    """Hand, object, contact forces and trail of an episode in 3D."""
+    """Show hand, object, contact forces and trail of an episode in 3D."""
     hand = f"/{root}_hand" if root else "/hand"  # as Branch.hand
     parts = [hand, *(f"/{root}/{part}".replace("//", "/") for part in ("cube", "contacts", "trail"))]
     return rrb.Spatial3DView(

@@ -59,7 +59,7 @@ def curve(missing: Missing, signal: str) -> Curve:
 
 
 def _means(values: Array, torque: Array, segment: NDArray[np.int64]) -> Array:
-    """Signal, mean, low and high (4, bins): the mean of segments' means, each as it has samples in the bin."""
+    """Return signal, mean, low and high (4, bins): the mean of segments' means, each as it has samples in the bin."""
     edges = np.unique(np.quantile(values, np.linspace(0.0, 1.0, BINS + 1)))
     place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, max(len(edges) - 2, 0))
     pair, index = np.unique(np.stack([place, segment]), axis=1, return_inverse=True)

@@ -28,7 +28,7 @@ DAMPING_RATIO = 0.03
 def _push(
     x: Array, j: int, p: Array, own: float, speed: float, torque: float, pull: float, now: float, dt: float
 ) -> float:
-    """Torque that would have to hold the rotor for it to stand after the step [N m].
+    """Return the torque that would hold the rotor at rest after the step [N m].
 
     The link is free to follow, against the friction that is left to it; the other joints stand.
     """

@@ -116,7 +116,7 @@ class MountTilt(Effect):
 
 
 def _turned(vector: Array, axis: Array, angle: Array) -> Array:
-    """Vectors (..., 3) about unit axes by angles (..., 1) [rad]; bit for bit the same at zero."""
+    """Turn vectors (..., 3) about unit axes by angles (..., 1) [rad]; bit for bit the same at zero."""
     along = np.sum(axis * vector, axis=-1, keepdims=True) * axis
     return vector + np.sin(angle) * np.cross(axis, vector) - (1.0 - np.cos(angle)) * (vector - along)
 

@@ -17,7 +17,7 @@ Array = npt.NDArray[np.float64]
 
 @compiled
 def shape_target(x: Array, c: int, dt: float, memory: Array) -> None:
-    """q_n -> low-pass -> rate limit -> torque limit -> q_d."""
+    """Pass q_n through low-pass, rate limit and torque limit to q_d."""
     for j in range(n):
         a = c * n + j
         filtered = low_pass(memory[plant.FILTERED + a], memory[plant.GOAL + a], memory[plant.TIME_CONSTANT], dt)
@@ -30,7 +30,7 @@ def shape_target(x: Array, c: int, dt: float, memory: Array) -> None:
 
 @compiled
 def sense_contact(x: Array, c: int, v: Array, dt: float, memory: Array) -> None:
-    """CONTACT and ACCELERATION from the speeds (N,) that the last step's torques led to."""
+    """Set CONTACT and ACCELERATION from the speeds (N,) that the last step's torques led to."""
     contact = block(memory, plant.CONTACT, (n,), c)
     if memory[plant.SEEN] == 0.0:
         contact[:] = 0.0
@@ -56,7 +56,7 @@ def sense_contact(x: Array, c: int, v: Array, dt: float, memory: Array) -> None:
 
 @compiled
 def torques_for_engine(c: int, q: Array, v: Array, torque: Array, memory: Array) -> None:
-    """Torques (N,) that give the engine's links the accelerations of the exact model, and what the next step needs.
+    """Return torques (N,) that give the engine's links the exact model's accelerations; keep what is needed next.
 
     The engine's links have spin inertia (PyBullet, in place of rotors) or armature (MuJoCo, native rotors), or neither.
     """
@@ -83,7 +83,7 @@ def torques_for_engine(c: int, q: Array, v: Array, torque: Array, memory: Array)
 
 @compiled
 def control(i: int, q: Array, v: Array, torque: Array, memory: Array) -> None:
-    """Torques (C N,) for the engine from the positions and speeds (C N,) of all its joints; row i of the trace."""
+    """Return torques (C N,) for the engine from positions and speeds (C N,) of all its joints; row i of the trace."""
     dt = memory[plant.DT]
     for c in range(C):
         x = signals_of(c, memory)

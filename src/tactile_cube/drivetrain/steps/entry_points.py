@@ -19,20 +19,20 @@ Integers = npt.NDArray[np.int64]
 
 @compiled_once
 def control_step(i: int, q: Array, v: Array, torque: Array, memory: Array) -> None:
-    """Torques (D,) for an engine's joints at q, v (D,); row i of the trace."""
+    """Return torques (D,) for an engine's joints at q, v (D,); row i of the trace."""
     control(i, borrowed(q), borrowed(v), borrowed(torque), borrowed(memory))
 
 
 @compiled_once
 def step(command: Array, memory: Array) -> None:
-    """One step of the mechanism without contacts, for a command (C n,)."""
+    """Advance the mechanism by a step without contacts, for a command (C n,)."""
     own = borrowed(memory)
     free_step(command, own, own[:0], 0)
 
 
 @compiled_once
 def rollout(commands: Array, history: int, substeps: int, memory: Array, rows: Integers, out: Array) -> None:
-    """Signals `rows` (R,) of each row of commands (H + T, C n) after the history into `out` (T, R, C n)."""
+    """Write signals `rows` (R,) of each row of commands (H + T, C n) after the history into `out` (T, R, C n)."""
     roll(commands, len(out), history, substeps, borrowed(memory), rows, out)
 
 
@@ -55,7 +55,7 @@ def segments_batch(
     last: int,
     out: Array,
 ) -> None:
-    """Multiple shooting: blocks first..last of memory (B, size) into `out` (B, T, R, C n).
+    """Simulate by multiple shooting: blocks first..last of memory (B, size) into `out` (B, T, R, C n).
 
     Block b plays commands[which[b]], (H + T, C n) each, and starts anew every `segment` rows from the measured
     `position` and `speed` (S, K, C n). `paths` (S, T PATH_WIDTH) are noted, or followed by blocks that say so; (S, 1)

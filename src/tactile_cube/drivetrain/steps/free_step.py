@@ -27,7 +27,7 @@ SLOPE_STEP = 1e-5  # [rad]
 
 @compiled
 def equations_at(c: int, q: Array, v: Array, memory: Array) -> None:
-    """The equations of motion of chain c where its joints are."""
+    """Return the equations of motion of chain c where its joints are."""
     q_all, v_all = block(memory, plant.Q_ALL, (N,)), block(memory, plant.V_ALL, (N,))
     ratio, offset = block(memory, plant.RATIO, (N,), c), block(memory, plant.OFFSET, (N,), c)
     expand(plant.FOLLOW, ratio, offset, q, v, q_all, v_all)
@@ -36,7 +36,7 @@ def equations_at(c: int, q: Array, v: Array, memory: Array) -> None:
 
 @compiled
 def note_equations(c: int, x: Array, q: Array, here: Array, memory: Array) -> None:
-    """Position, bias, weight and mass matrix without rotors, into a path's step."""
+    """Note position, bias, weight and mass matrix without rotors in a path's step."""
     for j in range(n):
         here[j], here[n + j], here[2 * n + j] = q[j], memory[plant.JOINT_BIAS + j], x[sig.WEIGHT, j]
         for k in range(n):
@@ -46,7 +46,7 @@ def note_equations(c: int, x: Array, q: Array, here: Array, memory: Array) -> No
 
 @compiled
 def note_slope(c: int, q: Array, v: Array, here: Array, memory: Array) -> None:
-    """Slope of M a + h over the positions, at the accelerations of the step, into a path's step."""
+    """Note the slope of M a + h over the positions, at the accelerations of the step, in a path's step."""
     for k in range(n):
         there = q[k]
         q[k] = there + SLOPE_STEP
@@ -63,7 +63,7 @@ def note_slope(c: int, q: Array, v: Array, here: Array, memory: Array) -> None:
 
 @compiled
 def take_equations(c: int, x: Array, q: Array, here: Array, memory: Array) -> None:
-    """The equations of motion of a path's step, linearised about its positions, with this model's own rotors."""
+    """Take the equations of motion of a path's step, linear in its positions, with this model's own rotors."""
     for j in range(n):
         load = here[n + j]
         for k in range(n):
@@ -76,7 +76,7 @@ def take_equations(c: int, x: Array, q: Array, here: Array, memory: Array) -> No
 
 @compiled
 def free_step(command: Array, memory: Array, path: Array, row: int) -> None:
-    """One step of the mechanism without contacts: semi-implicit Euler, as Bullet.
+    """Advance the mechanism by a step without contacts: semi-implicit Euler, as Bullet.
 
     A model that `follows` takes the equations of motion from step `row` of a path (steps PATH_WIDTH,), which another
     one has noted that went along it before; a path of less than a step is none.
@@ -119,7 +119,7 @@ def free_step(command: Array, memory: Array, path: Array, row: int) -> None:
 
 @compiled
 def advance_commands(command: Array, memory: Array) -> None:
-    """A step before the start: only effects on the command remember it."""
+    """Take a step before the start: only effects on the command have a state."""
     for c in range(C):
         x = signals_of(c, memory)
         for j in range(n):
@@ -131,7 +131,7 @@ def advance_commands(command: Array, memory: Array) -> None:
 def row_of_steps(
     k: int, command: Array, history: int, substeps: int, memory: Array, path: Array, rows: Integers, out: Array
 ) -> None:
-    """The steps of command row k; its signals are read at one of them, the last one or memory[READING] if earlier."""
+    """Take the steps of row k; its signals are read at one of them, the last one or memory[READING] if earlier."""
     reading = min(int(memory[plant.READING]), substeps - 1)
     for s in range(substeps):
         if k < history:
@@ -146,7 +146,7 @@ def row_of_steps(
 
 @compiled
 def roll(commands: Array, length: int, history: int, substeps: int, memory: Array, rows: Integers, out: Array) -> None:
-    """Signals of each command row after the history."""
+    """Write the signals of each command row after the history."""
     path = memory[:0]
     for k in range(history + length):
         row_of_steps(k, commands[k], history, substeps, memory, path, rows, out)
@@ -154,7 +154,7 @@ def roll(commands: Array, length: int, history: int, substeps: int, memory: Arra
 
 @compiled
 def note_free(memory: Array, free: Array) -> None:
-    """Marks the joints that their sensors do not show, within a gap of the transmission."""
+    """Mark the joints that their sensors do not show, within a gap of the transmission."""
     for a in range(C * n):
         if signals_of(a // n, memory)[sig.GAP, a % n] == 2.0:
             free[a] = 1.0
@@ -162,7 +162,7 @@ def note_free(memory: Array, free: Array) -> None:
 
 @compiled
 def copy_into(trial: Array, memory: Array) -> None:
-    """`trial[:] = memory`, whose general form takes the compiler seconds."""
+    """Copy by `trial[:] = memory`, whose general form takes the compiler seconds."""
     for k in range(len(memory)):
         trial[k] = memory[k]
 
@@ -171,7 +171,7 @@ def copy_into(trial: Array, memory: Array) -> None:
 def look_ahead(
     commands: Array, history: int, first: int, last: int, memory: Array, path: Array, trial: Array, free: Array
 ) -> None:
-    """Notes free joints in the steps first..last of `commands` to come, if any joint has a gap at all."""
+    """Note free joints in the steps first..last of `commands` to come, if any joint has a gap at all."""
     gaps = 0.0
     for a in range(C * n):
         gaps += signals_of(a // n, memory)[sig.GAP, a % n]
@@ -216,7 +216,7 @@ def start_first(
     memory: Array,
     path: Array,
 ) -> None:
-    """The first start of a window, moved by its `initial_state`; the torque there is a guess at first."""
+    """Set the first start of a window, moved by its `initial_state`; the torque there is a guess at first."""
     for _ in range(4):
         copy_into(trial, memory)
         free_step(command, trial, path, 0)
@@ -243,7 +243,7 @@ def roll_segments(
     rows: Integers,
     out: Array,
 ) -> None:
-    """As `roll`, started anew from the measured `position` and `speed` (K, C n) every `segment` rows.
+    """Roll, started anew from the measured `position` and `speed` (K, C n) every `segment` rows.
 
     `initial_state` (2 C n,) moves the first start in position and speed, `correction` (2 C n,) every start. A `path`
     is noted, or followed, see `free_step`; its rows are single steps.

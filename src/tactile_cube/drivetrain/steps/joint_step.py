@@ -16,7 +16,7 @@ Array = npt.NDArray[np.float64]
 
 @compiled
 def block(memory: Array, offset: int, shape: tuple[int, ...], c: int = 0) -> Array:
-    """Chain c's part of what lies at an offset, as an array of this shape."""
+    """Return chain c's part of what lies at an offset, as an array of this shape."""
     size = 1
     for length in shape:
         size *= length
@@ -25,13 +25,13 @@ def block(memory: Array, offset: int, shape: tuple[int, ...], c: int = 0) -> Arr
 
 @compiled
 def signals_of(c: int, memory: Array) -> Array:
-    """The signals x (ROWS, n) of chain c."""
+    """Return the signals x (ROWS, n) of chain c."""
     return block(memory, plant.SIGNALS, (sig.ROWS, n), c)
 
 
 @compiled
 def find_equations(c: int, q: Array, v: Array, memory: Array) -> None:
-    """Fills M, h of all dofs of chain c and their actuated-joint form, and the joints' part of h that is weight."""
+    """Fill in M, h of all dofs of chain c, their actuated-joint form, and the joints' part of h that is weight."""
     M, h = block(memory, plant.MASS_MATRIX, (N, N)), block(memory, plant.BIAS, (N,))
     mass, gravity = block(memory, plant.MASS, (N,), c), block(memory, plant.GRAVITY, (3,), c)
     work = block(memory, plant.WORK, (N + 1, WORK_COLUMNS))
@@ -65,7 +65,7 @@ def find_equations(c: int, q: Array, v: Array, memory: Array) -> None:
 
 @compiled
 def drive(x: Array, c: int, dt: float, memory: Array) -> None:
-    """Command to motor torque, q_m and the further torques on the joint."""
+    """Turn a command into motor torque, q_m and the further torques on the joint."""
     read_sensors(x, c, dt, memory)
     control_torque(x, c, dt, memory)
     for j in range(n):
@@ -88,7 +88,7 @@ def drive(x: Array, c: int, dt: float, memory: Array) -> None:
 
 @compiled
 def read_sensors(x: Array, c: int, dt: float, memory: Array) -> None:
-    """The measured speed, and the part of q_m that needs no torque to be known."""
+    """Read the measured speed, and the part of q_m that needs no torque to be known."""
     for j in range(n):
         x[sig.MEASURED_VELOCITY, j] = x[sig.VELOCITY, j]
         x[sig.SENSOR_VELOCITY, j] = x[sig.VELOCITY, j]
@@ -114,7 +114,7 @@ def read_sensors(x: Array, c: int, dt: float, memory: Array) -> None:
 
 @compiled
 def control_torque(x: Array, c: int, dt: float, memory: Array) -> None:
-    """The controller's torque within its limit, and its slope against the present speed."""
+    """Return the controller's torque within its limit, and its slope against the present speed."""
     for j in range(n):
         a = c * n + j
         kp, kd = memory[plant.KP + a], memory[plant.KD + a]
@@ -142,7 +142,7 @@ def control_torque(x: Array, c: int, dt: float, memory: Array) -> None:
 
 @compiled
 def note_extra_deflection(x: Array, c: int, memory: Array) -> None:
-    """What the closed form of the next step's torque does not know, exactly zero without effects that deflect.
+    """Note what the closed form of the next torque does not know: zero without effects that deflect.
 
     The slope of a further deflection, which would not converge if it was taken for a constant, and the rest.
     """
@@ -160,7 +160,7 @@ def note_extra_deflection(x: Array, c: int, memory: Array) -> None:
 
 @compiled
 def next_speeds(x: Array, c: int, dt: float, memory: Array) -> None:
-    """Speeds of chain c after the step, under dry friction, in memory[SPEED]; its accelerations beside them."""
+    """Set the speeds of chain c after the step, under dry friction, in memory[SPEED], and its accelerations."""
     for j in range(n):
         net = x[sig.TORQUE, j] + x[sig.JOINT_TORQUE, j] - x[sig.LOAD, j]
         x[sig.DIRECTION, j] = np.sign(x[sig.VELOCITY, j]) if x[sig.VELOCITY, j] != 0.0 else np.sign(net)

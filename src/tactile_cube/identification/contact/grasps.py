@@ -83,7 +83,7 @@ class Grasp:
         return self._known[key]
 
     def _fitted_grip(self, contact: ContactModel) -> Array:
-        """From zero, on the time before the box has weight, when nothing can slip yet."""
+        """Fit the grip from zero, on the time before the box has weight, when nothing can slip yet."""
         unknown = np.zeros(len(self.spread))
         target = self._target(contact, unknown)
         if self._slopes is None:

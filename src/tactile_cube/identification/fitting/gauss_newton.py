@@ -136,7 +136,7 @@ def prior_penalty(model: Model, unknowns: Sequence[Unknown]) -> float:
 
 
 def precision(unknowns: Sequence[Unknown]) -> Array:
-    """Weights (P,) of the expectations, per squared scale; a trace for those without, so that no direction is flat."""
+    """Return weights (P,) of the expectations, per squared scale; a trace for those without, so that none is flat."""
     return np.array([(u.scale / u.spread) ** 2 + 1e-9 for u in unknowns])
 
 

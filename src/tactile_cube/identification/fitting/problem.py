@@ -69,7 +69,7 @@ class Shooting(Simulator):
         return self.simulate([model] * len(begun), begun)[:, 0]
 
     def start_sensitivity(self, model: Model, windows: Windows, path: Path | None = None) -> Array:
-        """D position / d start of each segment, (2 n, S, K segment, sensors): by n positions, then n speeds.
+        """Return D position / d start of each segment, (2 n, S, K segment, sensors): by n positions, then n speeds.
 
         `path` is the model's own through these windows, if it is known.
         """
@@ -196,7 +196,7 @@ class Problem:
         return np.asarray(np.sum(residual * self.free(residual), axis=1))
 
     def columns(self, model: Model, unknowns: Sequence[Unknown], step: float = STEP) -> tuple[Array, Array]:
-        """Prediction (G, R) of a model and its derivatives (G, R, P), weighted, per unit of each unknown's scale."""
+        """Return a model's prediction (G, R) and derivatives (G, R, P), weighted, per unit of each unknown's scale."""
         base = self.prediction(model)
         if not unknowns:
             return base, np.zeros((*base.shape, 0))

@@ -182,7 +182,7 @@ def final_fit(problem: Problem, model: Model, unknowns: Sequence[Unknown], itera
 
 
 def standard_errors(problem: Problem, fitted: Fit, groups: Sequence[int] | None = None) -> Array:
-    """Standard errors (P,) of the unknowns, in units of their scales; `groups` of segments that err alike, if any do.
+    """Return standard errors (P,) of the unknowns in their scales; `groups` of segments that err alike, if any.
 
     The residual of an imperfect model is autocorrelated; so the scatter of the score is taken segment by
     segment (cluster-robust), and never less than white noise as large as the residual would give: of few long segments

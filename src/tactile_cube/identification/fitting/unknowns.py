@@ -119,7 +119,7 @@ def tolerance(recording: Recording) -> dict[str, tuple[float, float]]:
 def base_unknowns(
     recording: Recording, nominal: Mapping[str, Array], sizes: Mapping[str, Scales]
 ) -> tuple[Unknown, ...]:
-    """Constants that a refit may change, about their `nominal` values, and the joint offsets of each initialisation."""
+    """Return the constants that a refit may change, about `nominal`, and the joint offsets of each initialisation."""
     joints = range(len(recording.joints))
     constants = [
         _around_nominal(key, j, float(nominal[key][j]), low, high, key in recording.description.unknown)
@@ -157,7 +157,7 @@ def _creep(joint: int, size: float) -> Unknown:
 
 
 def _reading_delay(joint: int, row: float) -> Unknown:
-    """When within a row the position is read is never exact, and what is a row late is a delay."""
+    """Return the reading time within a row as an unknown: it is never exact, and what is a row late is a delay."""
     return Unknown("constant", "reading_delay", joint, -row, row, 0.1 * row, spread=READING_SPREAD * row)
 
 

@@ -120,7 +120,7 @@ def shapes(missing: Missing) -> list[Shape]:
 
 
 def black_box(missing: Missing, seed: int = 0) -> float:
-    """Share of the missing torque that a black box of all signals explains on segments it has not seen.
+    """Return the share of the missing torque that a black box of all signals explains on unseen segments.
 
     Ridge regression on the signals, their directions of motion, and random cosines of the signals, for either direction
     of the joint alone as well (Rahimi and Recht, 2007). The penalty is chosen within the segments that are learned.
@@ -149,7 +149,7 @@ def _features(missing: Missing, rng: np.random.Generator) -> Array:
 def _explained(
     features: Array, torque: Array, learn: NDArray[np.bool_], test: NDArray[np.bool_], ridge: float
 ) -> float:
-    """Share of the torque of some samples that a ridge regression on others explains."""
+    """Return the share of the torque of some samples that a ridge regression on others explains."""
     a, mean = features[learn], torque[learn].mean()
     weights = np.linalg.solve(a.T @ a + ridge * len(a) * np.eye(a.shape[1]), a.T @ (torque[learn] - mean))
     left = torque[test] - mean - features[test] @ weights

@@ -132,7 +132,7 @@ class Drift:
 
 
 def drifts(recording: Recording, groups: Sequence[Repeats], sensor: Array) -> tuple[Drift, ...]:
-    """Joints whose answers to repeated commands go one way with time, beyond chance and the sensor's noise (n,) [rad].
+    """Return joints whose answers to repeated commands go one way with time, beyond chance and noise (n,) [rad].
 
     Source: Good, Permutation, Parametric, and Bootstrap Tests of Hypotheses, 2005 (a trend by permutation).
     """
@@ -240,7 +240,7 @@ FEW_STEPS = 20  # a larger change is a multiple of any small step, within what i
 
 
 def reading_step(signal: Array) -> float:
-    """Resolution of a sensor [rad] that its readings (n,) show: changes are multiples of it; 0 where they show none."""
+    """Return the resolution [rad] of readings (n,) whose changes are multiples of it; 0 where they show none."""
     values = np.unique(signal)
     if len(values) < FEWEST_VALUES:
         return 0.0

@@ -137,7 +137,7 @@ def unknown_ending(path: Path, known: str) -> InputError:
 
 
 def read_table(path: Path, most: int = limits.NUMBERS) -> Table:
-    """Column name -> values, all of one length, of a Parquet, CSV or NPZ file of `most` numbers, looked at beforehand.
+    """Read column name -> values, all of one length, of a Parquet, CSV or NPZ file of at most `most` numbers.
 
     Raises:
         InputError: a missing, truncated or too large file, an unknown ending, or a column that holds no numbers.

@@ -15,7 +15,7 @@ NOTHING = 1e-9  # part of the probe below which it is rounding that passes
 
 
 def jump_ratio(plant: Plant, memory: Array, command: Array) -> tuple[Array, Array]:
-    """Jump of the measured position [1] and of the torque [N m/rad] per jump of the command that acts, each (n,).
+    """Return the jump of the measured position [1] and of the torque [N m/rad] per jump of the command, each (n,).
 
     What a motor follows freely within a gap is no part of either, see `free_way`.
 

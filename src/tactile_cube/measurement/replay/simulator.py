@@ -278,7 +278,7 @@ class Simulator:
         return found[:, 0], found[:, 1]
 
     def _links(self, model: Model, windows: Windows) -> Array:
-        """Link positions (S, n) near those of the first row: measured less what the motor leads at the first torque."""
+        """Return link positions (S, n) near the first row: measured less the motor's lead at the first torque."""
         constants = model.constants
         error = windows.commands[:, windows.history * windows.substeps] - windows.position[:, 0]
         torque = constants["kp"] * error - constants["kd"] * windows.speed[:, 0]

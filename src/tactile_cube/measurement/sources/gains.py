@@ -45,7 +45,7 @@ def estimated_gains(
 
 
 def motion_of(trials: Sequence[TrialTable], joints: int) -> Array:
-    """Position, velocity, acceleration, error of the loop and command (n, 5, joints) of some samples of all trials."""
+    """Return position, velocity, acceleration, loop error and command (n, 5, joints) of some samples of all trials."""
     usable = [trial for trial in trials if len(trial.time) > FEWEST and np.abs(trial.position).max() < limits.NUMBER]
     motion = np.concatenate([_motion(trial) for trial in usable] or [np.zeros((0, 5, joints))])
     return np.asarray(motion[np.isfinite(motion).all(axis=(1, 2))][:: max(1, len(motion) // MOST)])

@@ -59,7 +59,7 @@ class SimulatedSession:
         )  # fmt: skip
 
     def true_constants(self, joints: tuple[str, ...], rng: np.random.Generator) -> dict[str, Array]:
-        """Gains as stated; damping, friction and inertia differ from it by up to `true_spread`, joint by joint."""
+        """Return gains as stated, and damping, friction and inertia off by up to `true_spread`, joint by joint."""
         stated = {**self.controller, **self.nominal}
         constants = {key: per_joint(value, joints, key) for key, value in stated.items()}
         for key in ("kd", "static_friction", "reflected_inertia"):
@@ -68,7 +68,7 @@ class SimulatedSession:
         return constants
 
     def free_command(self, kind: str, rig: Rig, joints: Iterable[str], rng: np.random.Generator) -> Array:
-        """Commands (duration * rate, joints) [rad] of free motion within the middle `reach` of each joint's range."""
+        """Return commands (duration * rate, joints) [rad] of free motion, the middle `reach` of each range."""
         low, high = np.array([safe_range(rig.joints[joint], self.reach) for joint in joints]).T
         return excitation(kind, low, high, self.duration, self.rate, rng)
 

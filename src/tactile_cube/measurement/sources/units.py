@@ -109,7 +109,7 @@ def time_unit(said: str | None, name: str, time: Array) -> Unit:
 def position_unit(
     said: str | int | None, name: str, values: Array, joint: RigJoint, spans: Spans = MappingProxyType({})
 ) -> Unit:
-    """Unit of angles (or metres of a sliding joint): the first that fits the joint's limits, in doubt without any.
+    """Return the unit of positions: the first that fits the joint's limits, in doubt without any.
 
     `said` may be the ticks of an encoder's turn, or `range`: LeRobot's share of the calibrated range of each motor,
     in which `spans` (motor -> [rad]) or else the joint's limits are -100 .. 100 (0 .. 100 of a gripper).
@@ -195,7 +195,7 @@ def calibrated_spans(path: Path) -> dict[str, float]:
 
 
 def _ticks(turn: int, values: Array, joint: RigJoint, source: str) -> Unit:
-    """Ticks with the zero at 0 or in the middle of the turn: where the joint leaves its limits less, or is nearer."""
+    """Return ticks with the zero at 0 or in mid-turn: where the joint leaves its limits less, or is nearer."""
     if turn < FEWEST_TICKS:
         raise InputError(f"source.angle_unit={turn}: a turn has more ticks; for instance {USUAL_TICKS}")
     size, middle = 2 * np.pi / turn, 0.5 * (values.min() + values.max())
@@ -210,7 +210,7 @@ def _ticks(turn: int, values: Array, joint: RigJoint, source: str) -> Unit:
 def geared(
     units: Mapping[str, Unit], logged: Mapping[str, Array], columns: Mapping[str, str], said: float | None = None
 ) -> dict[str, Unit]:
-    """Units at one joint of what is logged on the motor's side of a gear, which the motor's and the link's angle tell.
+    """Return units of what is logged on the motor's side of a gear, as the motor's and the link's angle tell them.
 
     Commands are on the motor's side where they reach that far, torques where their column says so. `said`: turns of
     the motor a turn of its link, if the user says them.
@@ -236,7 +236,7 @@ def geared(
 
 
 def same_unit(command: Unit, position: Unit, ratio: float) -> tuple[Unit, Unit]:
-    """Units of a command and its position: one zero, and one unit where values alone told it and the motions are alike.
+    """Return one zero for command and position, and one unit where values alone told it and the motions are alike.
 
     `ratio` is the range of the position over that of the command, as logged.
     """
