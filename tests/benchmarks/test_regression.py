@@ -7,6 +7,7 @@ from pathlib import Path
 
 from benchmarks.blind.generator import write
 from benchmarks.regression.__main__ import draws
+from benchmarks.regression.intervals import held
 from benchmarks.regression.recall import holds
 
 ROUNDS = Path(__file__).parents[2] / "docs" / "results" / "data" / "rounds"
@@ -36,3 +37,19 @@ def test_recall_counts_a_set_only_at_the_true_joints_and_without_other_laws() ->
     assert holds("backlash(play)@b & payload(mass)@b", hidden) == ""
     assert holds("backlash(play)@a", hidden) == ""
     assert holds("backlash(play)@a & payload(mass)@b & cogging(7 values)@a", hidden) == "larger"
+
+
+def test_an_interval_is_counted_where_generator_and_catalogue_mean_the_same_number() -> None:
+    hidden = [
+        {"name": "backlash", "joints": ["a"], "parameters": {"gap": 0.02, "width": 1.0}},
+        {"name": "coupling_error", "joints": ["a"], "parameters": {"ratio": 0.75, "offset": 0.1}},
+        {"name": "payload", "joints": ["b"], "parameters": {"mass": 1.0}},
+    ]
+    narrow = {"low": 0.0, "high": 0.01}
+    named = [
+        {"name": "backlash", "joints": ["a"], "parameters": {"gap": {"low": 0.01, "high": 0.03}}},
+        {"name": "coupling_error", "joints": ["a"], "parameters": {"ratio": narrow, "offset": narrow}},
+        {"name": "payload", "joints": ["a"], "parameters": {"mass": narrow}},
+    ]
+    found = dict(held({"truth": {"effects": hidden}, "diagnosis": {"effects": named}}))
+    assert found == {"backlash.gap": True, "coupling_error.offset": False}

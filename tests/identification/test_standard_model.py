@@ -10,9 +10,14 @@ import pytest
 import yaml
 from numpy.typing import NDArray
 
+from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.identification.fitting.problem import Shooting
 from tactile_cube.identification.search.evidence import HeldOut
+from tactile_cube.identification.search.explanation import named, named_by
+from tactile_cube.identification.search.findings import find
+from tactile_cube.identification.search.search import Search
 from tactile_cube.identification.standard_model import StandardModel, fit_standard_model, soft_l1
+from tactile_cube.identification.verdict import decide
 from tactile_cube.measurement.comparing.noise_floor import noise_with_links, reading_step
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
@@ -84,6 +89,19 @@ def test_what_is_stated_wrongly_is_recovered_from_noisy_readings(tmp_path: Path)
     assert values["viscous_friction.damping"] == pytest.approx(VISCOUS, rel=0.1)
     assert values["coulomb_friction.friction"] == pytest.approx(DRY, rel=0.05)
     assert one.error < 0.05 * one.stated_error
+
+
+def test_a_search_judges_it_as_one_of_its_sets(tmp_path: Path) -> None:
+    """Three effects hide in it, and no law or pair of the search explains the motion."""
+    recording = recorded(tmp_path, {**SWINGS, **SINES})
+    effects = (find_effect("nonlinear_drag"), find_effect("command_delay"))
+    one = standard(recording)
+    search = Search(*held_out_split(recording), noise_with_links(recording), effects, lambda line: None)
+    assert decide(find(search)).kind == "unknown_effect"
+    verdict = decide(find(search, one.proposal))
+    assert verdict.kind == "missing_effect"
+    assert named(verdict.chosen) == named_by(one.effects)
+    assert verdict.chosen.error < 1.1
 
 
 def test_swings_without_any_command_have_their_scale_from_gravity_and_inertia(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.resolution import Fitted, resolved
 from tactile_cube.identification.next_experiment import Experiment, next_experiment
 from tactile_cube.identification.search.evidence import HeldOut, gain, judge
-from tactile_cube.identification.search.explanation import Explanation
+from tactile_cube.identification.search.explanation import Explanation, Proposal
 from tactile_cube.identification.search.findings import CommonOffset, Findings, common_offsets, find
 from tactile_cube.identification.search.search import BestSoFar, Search
 from tactile_cube.identification.standard_model import StandardModel, fit_standard_model
@@ -69,6 +69,7 @@ class Inquiry:
         say: takes progress lines.
         known: the model to begin with; None: what the recording's owner states.
         criteria: what decides.
+        standard: the field's standard model as a set of effects, one of those to be judged; None where it is no better.
     """
 
     recording: Recording
@@ -77,6 +78,7 @@ class Inquiry:
     say: Callable[[str], None]
     known: ModelFile | None
     criteria: Criteria
+    standard: Proposal | None = None
 
     @cached_property
     def parts(self) -> tuple[Recording, Recording, Recording | None]:
@@ -96,7 +98,7 @@ class Inquiry:
     def answer(self) -> Answer:
         """What is found."""
         search = self.search
-        findings = find(search)
+        findings = find(search, self.standard)
         simulations = Simulations(search, findings.base, noise_floor(self.recording))
         return Answer(search, findings, simulations, decide(findings, self.criteria))
 
@@ -229,7 +231,7 @@ def diagnose_recording(
     first = standard.sentence(common_unit(recording.shown.values()))
     say.answer, say.following = first.partition(";")[0], "the stated model with its constants refitted"
     say(first)
-    inquiry, left_out, suspected = beside_disturbances(whole)
+    inquiry, left_out, suspected = beside_disturbances(replace(whole, standard=standard.proposal))
     search, findings, simulations, verdict = inquiry.answer
     if findings.stopped:
         say(f"stopped early, after {search.shooting.simulated:.0f} s of simulated trials; next: {findings.stopped}")
@@ -331,7 +333,7 @@ def open_fits(diagnosis: Diagnosis) -> dict[str, Fit]:
 def test_errors(
     search: Search, test: Recording, models: Mapping[str, Model], step: float
 ) -> tuple[dict[str, ErrorSummary], dict[str, float]]:
-    """Free-running errors of the model as stated and of fitted ones [rad], and errors of their segments over the noise.
+    """Return free-running errors as stated and of fitted models [rad], and errors of their segments over the noise.
 
     Joint offsets of initialisations that a model has not seen are fitted; `step` is that of the free runs [s].
     """
@@ -370,7 +372,7 @@ class Unseen(NamedTuple):
 
 
 def unseen(effects: Sequence[type[Effect]], sizes: Mapping[str, Scales], named: Collection[str]) -> tuple[Unseen, ...]:
-    """Effects that no trial of a recording with joints of these sizes could show, but for those that were `named`."""
+    """Return effects that no trial with joints of these sizes could show, but for those that were `named`."""
     found = (
         Unseen(effect_path(e), joint, why) for e in effects for joint, s in sizes.items() if (why := e.unseen_at(s))
     )

@@ -26,6 +26,7 @@ from tactile_cube.identification.fitting.resolution import NORMAL_95, standard_e
 from tactile_cube.identification.fitting.unknowns import base_unknowns, every_effect
 from tactile_cube.identification.search.candidates import Candidate, model_unknowns
 from tactile_cube.identification.search.evidence import HeldOut
+from tactile_cube.identification.search.explanation import Proposal
 from tactile_cube.identification.search.search import some
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model, Term, nominal_model
@@ -94,6 +95,11 @@ class StandardModel:
     half_width: Array = field(repr=False)
     stated_error: float
     error: float
+
+    @property
+    def proposal(self) -> Proposal | None:
+        """Its effects as a set for the search; None without any."""
+        return Proposal(self.effects, self.fit) if self.fit and self.effects else None
 
     @property
     def otherwise(self) -> tuple[str, ...]:

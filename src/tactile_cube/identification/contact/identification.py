@@ -75,7 +75,7 @@ def final(grasps: OpenGrasps, model: Model) -> Fitted:
     pull, information = columns.reshape(-1, len(scales)).T @ moved.ravel(), np.einsum("grp,grq->pq", columns, columns)
     shift = -scales * np.linalg.solve(information + np.diag(precision(fitted.unknowns)), pull)
     student = stats.t.ppf(0.975, max(len(set(problem.alike)) - 1, 1))  # each initialisation has errors of its own
-    return Fitted(fitted.model, fitted, student * scales * standard_errors(problem, fitted, problem.alike), shift)
+    return Fitted(fitted.model, fitted, student * scales * standard_errors(problem, fitted), shift)
 
 
 @dataclass(frozen=True)

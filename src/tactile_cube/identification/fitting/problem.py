@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.errors import InputError
 from tactile_cube.identification.fitting.unknowns import Unknown
+from tactile_cube.measurement.comparing.noise_floor import of_one_command
 from tactile_cube.measurement.joint_scales import joint_scales
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
@@ -39,6 +41,12 @@ class Shooting(Simulator):
         self.sizes = dict(zip(recording.joints, self.scales, strict=True))
         time = self.scales[0].time
         super().__init__(recording, effects, LONGEST_STEP * time, time=time)
+
+    @cached_property
+    def command_of(self) -> dict[int, tuple[int, int]]:
+        """Trial -> the number of its command, and by how many samples it starts later in it than the first one."""
+        groups = of_one_command(self.recording.trials)
+        return {trial: (number, lag) for number, group in enumerate(groups) for trial, lag in group}
 
     @property
     def start_speed(self) -> Array:
@@ -112,6 +120,18 @@ class Problem:
         self._starts: Array = np.zeros((*self.weight.shape, 0))
         self._inverse: Array = np.zeros((len(self.weight), 0, 0))
         self._path: tuple[Model, Windows, Path] | None = None
+
+    @cached_property
+    def alike(self) -> list[int]:
+        """Numbers (G,) of the segments that a wrong law misses alike: of one command, about as late in it."""
+        numbers: dict[tuple[int, int], int] = {}
+        found = []
+        for trial, time in zip(self.windows.trial, self.windows.time, strict=True):
+            command, lag = self.shooting.command_of[int(trial)]
+            first = round((time / self.shooting.recording.step + lag) / self.windows.segment)
+            for k in range(self.windows.segments):
+                found.append(numbers.setdefault((command, first + k), len(numbers)))
+        return found
 
     def path(self, model: Model) -> Path:
         """Return the model's path through the windows; the last one is cached."""

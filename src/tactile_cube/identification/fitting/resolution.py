@@ -181,22 +181,21 @@ def final_fit(problem: Problem, model: Model, unknowns: Sequence[Unknown], itera
     return Fitted(fitted.model, fitted, half_width, step_shift(problem, fitted))
 
 
-def standard_errors(problem: Problem, fitted: Fit, groups: Sequence[int] | None = None) -> Array:
-    """Return standard errors (P,) of the unknowns in their scales; `groups` of segments that err alike, if any.
+def standard_errors(problem: Problem, fitted: Fit) -> Array:
+    """Return standard errors (P,) of the unknowns in their scales.
 
-    The residual of an imperfect model is autocorrelated; so the scatter of the score is taken segment by
-    segment (cluster-robust), and never less than white noise as large as the residual would give: of few long segments
-    the scatter says little.
+    The residual of an imperfect model is autocorrelated, and the same in each repeat of a command; so the scatter of
+    the score is taken over segments of the same moment of a command (cluster-robust), and never less than white noise
+    as large as the residual would give: of few long segments the scatter says little.
     """
     freed = problem.free(fitted.residual)
     scores = np.einsum("grp,gr->gp", fitted.columns, freed, optimize=True)
-    if groups is not None:
-        scores = np.stack([scores[np.equal(groups, one)].sum(axis=0) for one in sorted(set(groups))])
+    scores = np.stack([scores[np.equal(problem.alike, one)].sum(axis=0) for one in sorted(set(problem.alike))])
     sizes, directions = np.linalg.eigh(fitted.information + np.diag(precision(fitted.unknowns)))
     sure = np.maximum(sizes, np.finfo(float).eps * sizes.max())  # what the data say nothing of may round to below zero
     inverse = (directions / sure) @ directions.T
-    segments, unknowns = scores.shape
-    correction = segments / max(segments - unknowns, 1)
+    clusters, unknowns = scores.shape
+    correction = clusters / max(clusters - unknowns, 1)
     robust = inverse @ (scores.T @ scores * correction) @ inverse
     variance = max(fitted.cost / max(float(np.count_nonzero(problem.weight)), 1.0), 1.0)
     return np.asarray(np.sqrt(np.maximum(np.diag(robust), variance * np.diag(inverse))))

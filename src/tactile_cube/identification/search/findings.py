@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,6 +29,7 @@ from tactile_cube.identification.search.proposals import (
     CLOSE,
     Looks,
     Tried,
+    again,
     detailed,
     explains_most,
     further,
@@ -39,13 +40,14 @@ from tactile_cube.identification.search.proposals import (
     of_a_kind,
     off,
     refitted,
+    whole,
     without,
 )
 from tactile_cube.identification.search.search import Search
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model, Term
 
-MOST = 4  # laws in a set, each at all the joints where it improves the fit
+MOST = 4  # laws in a set beside those of the standard model, each at all the joints where it improves the fit
 JUDGED = 6  # cheapest sets that are scored on held-out trials, and most alternatives to one of the chosen effects
 
 
@@ -100,8 +102,12 @@ class Findings:
         return sorted(doubtful, key=lambda one: one.error)
 
 
-def find(search: Search) -> Findings:
-    """Search a recording for the effects that its model lacks."""
+def find(search: Search, standard: Proposal | None = None) -> Findings:
+    """Search a recording for the effects that its model lacks.
+
+    The field's `standard` model is one of the sets; where it is better than each law and pair, the search goes on
+    beside it.
+    """
     if search.base.largest_error > search.criteria.adequate and not off(search, search.base.fit):
         search.focus()
     base, nominal = search.base, search.judged(search.start)
@@ -110,59 +116,63 @@ def find(search: Search) -> Findings:
         shared = shared_offset(base, search.fitted, search.effects, search.shooting.sizes)
         return Findings(base, nominal, (shared,) if shared else ())
     search.stand(f"constants refitted ({base.error:.2f} x sensor noise on held-out trials)", "every law by itself")
-    way, first = proposed(search)
+    way, first = proposed(search, standard)
     looked = max(first.laws, 1) if first else 1
     found = Findings(
         base,
         nominal,
-        tuple(search.explained(one, looked) for one in to_be_judged(way, search)),
+        tuple(search.explained(one, looked) for one in to_be_judged(way, search, standard)),
         tuple(first.scores) if first else (),
         looked,
     )
-    if first and (good := found.proven(search.criteria)):
-        chosen = simplest(sound(good, base, search.criteria, looked), search.criteria)
+    chosen: Explanation | None = None
+    while first and (good := found.proven(search.criteria)):
+        before, chosen = chosen, simplest(sound(good, base, search.criteria, looked), search.criteria)
         search.stand(f"{chosen.label} ({chosen.error:.2f} x sensor noise on held-out trials)", "its possible twins")
-        if nameable(chosen, base, search.criteria):
-            others = tuple(search.explained(one, looked) for one in twins(search, chosen, first, found.judged))
-            found = replace(found, judged=(*found.judged, *others))
+        if chosen is before or not nameable(chosen, base, search.criteria):
+            break
+        others = tuple(search.explained(one, looked) for one in twins(search, chosen, first, found.judged))
+        found = replace(found, judged=(*found.judged, *others))
     return replace(found, stopped=search.following if search.spent else "")
 
 
-def proposed(search: Search) -> tuple[list[Proposal], Looks | None]:
+def proposed(search: Search, standard: Proposal | None) -> tuple[list[Proposal], Looks | None]:
     """Return candidate sets, ranked on the fitted trials alone, and the screening of single laws."""
-    parent = Proposal((), search.base.fit)
+    parent, usual = Proposal((), search.base.fit), {one.effect.name for one in standard.effects} if standard else set()
     found: list[Proposal] = []
     first: Looks | None = None
     for _ in range(MOST):
         places = off(search, parent.fit)
-        if not places or laws_of(parent) >= MOST or search.spent:
+        if not places or laws_of(parent, usual) >= MOST or search.spent:
             break
         looks = look(search, parent, [search.fitted.joints[j] for j in places])
         first = first or looks
         if not looks.tried:
             break
         search.say(f"{len(looks.scores)} starts of {looks.laws} laws beside {parent.label}")
-        tried = [one for one in grown(search, looks) if laws_of(one) <= MOST]
+        tried = [one for one in grown(search, looks) if laws_of(one, usual) <= MOST]
+        if standard and looks is first and not whole(search, tried) and not search.spent:
+            tried = sorted([*tried, again(search, standard)], key=lambda one: one.price(search.criteria))
         if tried and len(tried[0].effects) > len(parent.effects) + 1 and (richer := detailed(search, tried[0])):
             tried = sorted([*tried, richer], key=lambda one: one.price(search.criteria))
         found += tried
         if not tried or tried[0].price(search.criteria) >= parent.price(search.criteria):
             break
         before, parent = parent, tried[0]
-        if out_of_reach(search, before, parent) or in_detail(search, before, parent):
+        if out_of_reach(search, before, parent, MOST - laws_of(parent, usual)) or in_detail(search, before, parent):
             break
         search.say.following = "one effect more, and each one taken out"
     return [*found, *reduced(search, parent)], first
 
 
-def out_of_reach(search: Search, before: Proposal, one: Proposal) -> bool:
-    """Return whether a set cannot explain enough to be named, even if further laws explain as much as the last.
+def out_of_reach(search: Search, before: Proposal, one: Proposal, more: int) -> bool:
+    """Return whether a set cannot explain enough to be named, even if so many more laws explain as much as the last.
 
     Laws are added in the order of what they explain, so the next ones explain less.
     """
     criteria, rows = search.criteria, np.count_nonzero(search.problem.weight)
     taken = (before.fit.cost - one.fit.cost) / max(laws_of(one) - laws_of(before), 1)
-    left = one.fit.cost - (MOST - laws_of(one)) * taken - rows
+    left = one.fit.cost - more * taken - rows
     enough = max((1.0 - criteria.most) * (search.base.fit.cost - rows), (criteria.tolerated**2 - 1.0) * rows)
     return bool(left > enough)
 
@@ -178,9 +188,9 @@ def in_detail(search: Search, before: Proposal, one: Proposal) -> bool:
     return bool(nearly_whole and before.fit.cost - one.fit.cost < criteria.most * rest)
 
 
-def laws_of(one: Proposal) -> int:
-    """Return the number of laws in a set, however many joints they act at."""
-    return len({effect.effect.name for effect in one.effects})
+def laws_of(one: Proposal, usual: Collection[str] = ()) -> int:
+    """Return the number of laws in a set beside the usual ones, however many joints they act at."""
+    return len({effect.effect.name for effect in one.effects}.difference(usual))
 
 
 def reduced(search: Search, one: Proposal) -> list[Proposal]:
@@ -201,15 +211,17 @@ def together(effects: Sequence[Candidate]) -> list[list[int]]:
     return [[place for place, name in enumerate(names) if name == law] for law in dict.fromkeys(names)]
 
 
-def to_be_judged(found: Sequence[Proposal], search: Search) -> list[Proposal]:
-    """Return the sets to score: the `JUDGED` cheapest, and the cheapest of each number of laws."""
+def to_be_judged(found: Sequence[Proposal], search: Search, standard: Proposal | None) -> list[Proposal]:
+    """Return the sets to score: the `JUDGED` cheapest, the cheapest of each number of laws, and the standard model."""
     cheapest: dict[frozenset[tuple[str, str]], Proposal] = {}
     for one in sorted(found, key=lambda one: one.price(search.criteria)):
         cheapest.setdefault(named_by(one.effects), one)
     sets, first = list(cheapest.values()), dict[int, int]()
     for place, one in enumerate(sets):
         first.setdefault(laws_of(one), place)
-    return [sets[place] for place in sorted({*range(min(JUDGED, len(sets))), *first.values()})]
+    usual = named_by(standard.effects) if standard else None
+    also = (place for place, one in enumerate(sets) if named_by(one.effects) == usual)
+    return [sets[place] for place in sorted({*range(min(JUDGED, len(sets))), *first.values(), *also})]
 
 
 def twins(search: Search, chosen: Explanation, first: Looks, judged: Sequence[Explanation]) -> list[Proposal]:

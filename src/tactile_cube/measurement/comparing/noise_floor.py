@@ -37,19 +37,26 @@ def aligned_repeats(trials: Sequence[Trial]) -> list[Repeats]:
     bridged samples and a joint's wait at its start, which differs from repeat to repeat and which a simulation starts
     from.
     """
-    groups: list[Repeats] = []
-    waiting = list(trials)
-    while waiting:
-        same = repeats_of(waiting, 0)
-        if same:
-            members = [(waiting[0], 0), *((waiting[place], lag) for place, lag in same)]
-            start = max(0, *(lag for _, lag in members))
-            measured = [np.where(_telling(trial), trial.position, np.nan)[start - lag :] for trial, lag in members]
+    found = []
+    for group in of_one_command(trials):
+        if len(group) > 1:
+            start = max(lag for _, lag in group)
+            members = [(trials[place], start - lag) for place, lag in group]
+            measured = [np.where(_telling(trial), trial.position, np.nan)[later:] for trial, later in members]
             length = min(map(len, measured))
             told = np.stack([positions[:length] for positions in measured])
-            groups.append(Repeats(tuple(trial for trial, _ in members), told))
-        taken = {0, *(place for place, _ in same)}
-        waiting = [trial for place, trial in enumerate(waiting) if place not in taken]
+            found.append(Repeats(tuple(trial for trial, _ in members), told))
+    return found
+
+
+def of_one_command(trials: Sequence[Trial]) -> list[list[tuple[int, int]]]:
+    """Return the places of the trials of each command, and by how many samples each starts later than the first."""
+    groups, waiting = [], [*range(len(trials))]
+    while waiting:
+        same = repeats_of([trials[place] for place in waiting], 0)
+        groups.append([(waiting[0], 0), *((waiting[place], lag) for place, lag in same)])
+        taken = {place for place, _ in groups[-1]}
+        waiting = [place for place in waiting if place not in taken]
     return groups
 
 
