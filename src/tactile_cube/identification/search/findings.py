@@ -29,7 +29,6 @@ from tactile_cube.identification.search.proposals import (
     CLOSE,
     Looks,
     Tried,
-    again,
     detailed,
     explains_most,
     further,
@@ -37,6 +36,7 @@ from tactile_cube.identification.search.proposals import (
     left_by,
     look,
     near,
+    noted,
     of_a_kind,
     off,
     refitted,
@@ -152,7 +152,8 @@ def proposed(search: Search, standard: Proposal | None) -> tuple[list[Proposal],
         search.say(f"{len(looks.scores)} starts of {looks.laws} laws beside {parent.label}")
         tried = [one for one in grown(search, looks) if laws_of(one, usual) <= MOST]
         if standard and looks is first and not whole(search, tried) and not search.spent:
-            tried = sorted([*tried, again(search, standard)], key=lambda one: one.price(search.criteria))
+            usually = noted(search, Proposal(standard.effects, search.refitted(standard.fit.model)))
+            tried = sorted([*tried, usually], key=lambda one: one.price(search.criteria))
         if tried and len(tried[0].effects) > len(parent.effects) + 1 and (richer := detailed(search, tried[0])):
             tried = sorted([*tried, richer], key=lambda one: one.price(search.criteria))
         found += tried

@@ -192,11 +192,6 @@ def refitted(search: Search, looks: Looks, laws: Tried) -> Proposal:
     return noted(search, one)
 
 
-def again(search: Search, one: Proposal) -> Proposal:
-    """Refit a set that was fitted to other windows."""
-    return noted(search, Proposal(one.effects, search.refitted(one.fit.model)))
-
-
 def noted(search: Search, one: Proposal) -> Proposal:
     """Report a set, and note it if it is the best so far."""
     left = search.over_noise(one.fit)
