@@ -1,10 +1,19 @@
 """What has changed between two models of one machine."""
 
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
-from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile
-from tactile_cube.identification.model_files import changed, drifts
+from tactile_cube.drivetrain.effects import find_effect
+from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelErrors, ModelFile
+from tactile_cube.identification.fitting.resolution import Fitted
+from tactile_cube.identification.model_files import changed, drifts, model_file
+from tactile_cube.measurement.replay.model import Term, nominal_model
+from tests.identification.rigs_of_any_size import Size, simulated
 
 
 def estimate(value: float, half: float) -> Estimate:
@@ -47,3 +56,16 @@ def test_chance_makes_as_many_changes_as_the_significance_allows() -> None:
 
     alarms = [bool(changed(drifts(drawn(), drawn()), 0.1)) for _ in range(1000)]
     assert 0.07 < np.mean(alarms) < 0.13
+
+
+@pytest.mark.parametrize(("slides", "units"), [(True, ("N", "N s/m", "m")), (False, ("N m", "N m s/rad", "rad"))])
+def test_numbers_of_a_sliding_joint_are_forces_and_metres(tmp_path: Path, slides: bool, units: tuple[str, ...]) -> None:
+    viscous = find_effect("viscous_friction")
+    recording = simulated(tmp_path, Size(slides=slides), viscous, {"damping": 0.08})
+    term = Term(viscous, "a", viscous("a", damping=0.08).values, ("damping",))
+    fitted = replace(nominal_model(recording), terms=(term,))
+    errors = ModelErrors(nominal=1.0, refitted=1.0, with_effects=1.0, noise_floor=1.0, over_noise=1.0, joints={})
+    fit: Any = SimpleNamespace(unknowns=())
+    written = model_file(recording, Fitted(fitted, fit, np.zeros(0), np.zeros(0)), errors, [], "", 0)
+    estimates = (written.values["static_friction"], {"a": written.effects[0].parameters["damping"]}, written.offsets)
+    assert tuple(one["a"].unit for one in estimates) == units

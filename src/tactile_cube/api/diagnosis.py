@@ -164,7 +164,7 @@ def _of_free_motion(job: Job, recording: Recording, known: ModelFile | None, say
     criteria = Criteria(**config.criteria)
     found = diagnose_recording(moving, effects, config.step, config.seed, say, known, criteria)
     model = model_file(moving, found.fitted, found.errors(), [*found.held_out, *found.tested], job.command, config.seed)
-    data = as_json(found, job.seconds) | {"units": recording.units}
+    data = as_json(found, job.seconds, recording.units)
     if known is not None:
         model = model.model_copy(update={"effects": model.with_effects(known.object_effects)})
         data["known_effects"] += [one.effect for one in known.object_effects]

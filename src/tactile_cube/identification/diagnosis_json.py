@@ -1,6 +1,6 @@
 """diagnosis.json: the diagnosis as plain numbers, for scripts."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -18,11 +18,11 @@ from tactile_cube.measurement.replay.model import effect_label, effect_path
 RANKED = 20
 
 
-def as_json(diagnosis: Diagnosis, seconds: float) -> dict[str, Any]:
-    """Return the content of diagnosis.json, with errors in [rad]."""
+def as_json(diagnosis: Diagnosis, seconds: float, units: Mapping[str, str]) -> dict[str, Any]:
+    """Return the content of diagnosis.json, with errors in the `units` of the joints' positions."""
     verdict, experiment = diagnosis.verdict, diagnosis.experiment
     explanations = [(verdict.chosen, diagnosis.fitted), *diagnosis.rivals]
-    effects = effect_entries(explanations)
+    effects = effect_entries(explanations, units)
     errors = diagnosis.errors().model_dump()
     joints = list(diagnosis.stages["nominal"].joints)
     return {
@@ -65,6 +65,7 @@ def as_json(diagnosis: Diagnosis, seconds: float) -> dict[str, Any]:
         "tested": diagnosis.tested,
         "stopped_early": diagnosis.findings.stopped,
         "seconds": round(seconds, 2),
+        "units": dict(units),
     }
 
 
@@ -115,14 +116,16 @@ def names_of(explanation: Explanation) -> list[str]:
     return list(dict.fromkeys(name for candidate in explanation.effects for name in _label(candidate)))
 
 
-def effect_entries(explanations: Sequence[tuple[Explanation, Fitted]]) -> list[dict[str, Any]]:
+def effect_entries(
+    explanations: Sequence[tuple[Explanation, Fitted]], units: Mapping[str, str] | None = None
+) -> list[dict[str, Any]]:
     """Return the effects of the chosen explanation and its rivals, each with those it is not separable from."""
     entries = []
     for one, fitted in explanations:
         known, first = bounds(fitted), len(fitted.model.terms) - one.terms
         rivals = [name for other, _ in explanations if other is not one for name in names_of(other)]
         for place, term in enumerate(fitted.model.terms[first:], start=first):
-            estimate = effect_estimate(term, place, known)
+            estimate = effect_estimate(term, place, known, units)
             entries.append(
                 {
                     "name": effect_path(term.effect),

@@ -12,6 +12,7 @@ from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelEr
 from tactile_cube.identification.fitting.resolution import NORMAL_95, Fitted, bounds
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import CONTROLLER, Term, nominal_model
+from tactile_cube.measurement.units import TURNS, of_joint
 
 UNITS = {
     "kp": "N m/rad",
@@ -33,18 +34,24 @@ def model_file(
     known, model, offsets = bounds(fitted), fitted.model, dict[str, Estimate]()
     for j, joint in enumerate(recording.joints):
         found = [-float(one[j]) for one in model.offsets.values()]
-        offsets[joint] = Estimate(value=float(np.mean(found)), low=min(found), high=max(found), unit="rad")
+        offsets[joint] = Estimate(
+            value=float(np.mean(found)), low=min(found), high=max(found), unit=recording.units[joint]
+        )
     return ModelFile(
         rig=recording.name,
         joints=list(recording.joints),
         values={
             key: {
-                joint: _estimate(float(model.constants[key][j]), known.get(("constant", key, j, 0)), unit)
+                joint: _estimate(
+                    float(model.constants[key][j]),
+                    known.get(("constant", key, j, 0)),
+                    of_joint(unit, recording.units[joint]),
+                )
                 for j, joint in enumerate(recording.joints)
             }
             for key, unit in UNITS.items()
         },
-        effects=[effect_estimate(term, place, known) for place, term in enumerate(model.terms)],
+        effects=[effect_estimate(term, place, known, recording.units) for place, term in enumerate(model.terms)],
         offsets=offsets,
         provenance=_provenance(recording, held_out, command, seed),
         errors=errors,
@@ -75,9 +82,13 @@ def _provenance(recording: Recording, held_out: list[str], command: str, seed: i
     )
 
 
-def effect_estimate(term: Term, place: int, known: Known) -> EffectEstimate:
-    """Return an effect with every parameter; those not fitted have an interval of zero width."""
-    units = {p.name: p.unit for p in term.effect.parameters}
+def effect_estimate(term: Term, place: int, known: Known, joints: Mapping[str, str] | None = None) -> EffectEstimate:
+    """Return an effect with every parameter; those not fitted have an interval of zero width.
+
+    `joints`: the unit of each joint's position; where none is given, it turns.
+    """
+    turns_or_slides = (joints or {}).get(term.joint, TURNS)
+    units = {p.name: of_joint(p.unit, turns_or_slides) for p in term.effect.parameters}
     parameters = {
         key: _estimate(value, known.get(("effect", key, place, 0)), units[key]) for key, value in term.values.items()
     }
