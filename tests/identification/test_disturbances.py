@@ -62,6 +62,10 @@ def test_what_other_runs_of_the_command_show_too_is_no_push(plain: Recording) ->
     assert found(pushed(plain, 0, 1, 2)) == []
 
 
+def test_two_pushes_at_the_same_time_are_found_where_a_third_run_shows_none(plain: Recording) -> None:
+    assert [one.trial for one in found(pushed(plain, 0, 2))] == ["run_0", "run_2"]
+
+
 def test_what_nothing_repeats_is_found_and_said_to_be_alone(plain: Recording) -> None:
     only = plain.with_trials(pushed(plain, 0).trials[:1])
     assert [(one.trial, one.repeats) for one in found(only)] == [("run_0", 0)]

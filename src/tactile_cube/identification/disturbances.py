@@ -106,14 +106,12 @@ def _by_trial(problem: Problem, errors: Array, trials: int) -> list[Array]:
 
 
 def _shared(own: Array, place: int, others: Sequence[tuple[Array, int]], rows: int) -> bool:
-    """Return whether another run of the same command also fails at about that time, at the joint with most error."""
+    """Return whether all other runs of the command fail at about that time too, at the joint with most error."""
     joint = int(np.nanargmax(own[place]))
-    for errors, lag in others:
-        there = place - round(lag / rows)
-        near = errors[max(there - 1, 0) : there + 2, joint]
-        if np.any(STANDS_OUT * near > own[place, joint]):
-            return True
-    return False
+    there = [(errors[:, joint], place - round(lag / rows)) for errors, lag in others]
+    near = [errors[max(first - 1, 0) : first + 2] for errors, first in there]
+    measured = [errors for errors in near if np.isfinite(errors).any()]
+    return bool(measured) and all(np.any(STANDS_OUT * errors > own[place, joint]) for errors in measured)
 
 
 def _intervals(failing: NDArray[np.int64]) -> list[tuple[int, int]]:
