@@ -3,7 +3,7 @@ import pytest
 
 from tactile_cube.drivetrain import DrivetrainConstants, Plant
 from tactile_cube.drivetrain.effects import catalogue, find_effect
-from tactile_cube.measurement.replay.read_out import before_steps, free_way, jump_ratio, read_out
+from tactile_cube.measurement.replay.read_out import before_steps, free_way, jump_ratio, read_out, spring_ratios
 from tests.drivetrain.rigs import wheel
 
 
@@ -115,3 +115,20 @@ def test_a_motor_follows_the_command_freely_as_far_as_its_gap_goes(plant, values
 @pytest.mark.filterwarnings("error")
 def test_within_a_gap_wider_than_the_probe_the_plain_drives_ratio_holds(plant: Plant) -> None:
     assert position_ratio(plant, BACKLASH("q", play=0.0, gap=0.2)) == pytest.approx(PLAIN)
+
+
+def test_a_stiffening_spring_jumps_as_its_two_torques_say(plant: Plant) -> None:
+    """Torques of deflections d by tau = K d + c d^3 at K = 10 N m/rad; the command leads the joint by tau / kp + d."""
+    spring = find_effect("stiffening_elasticity")("q", compliance=1.0 / 10.0 - 1.0 / STIFFNESS, cubic=4e4)
+    memory, deflection = memory_of(plant, spring), np.array([[0.004], [0.012], [0.012]])
+    torque = 10.0 * deflection + 4e4 * deflection**3
+    lead = torque / KP + deflection
+    ratios = spring_ratios(plant, memory, lead[1:] - lead[:2], torque[1:], (np.full((1, 1), PLAIN), (1.0 - PLAIN) * KP))
+    read, felt = read_out(deflection[1:], torque[1:], lead[1:] - lead[:2], ratios, np.array([100.0]))
+    assert read == pytest.approx(deflection[:2])
+    assert felt == pytest.approx(torque[:2])
+
+
+def test_a_plain_drives_ratios_stay(plant: Plant) -> None:
+    ratios = np.full((1, 1), 0.1), np.full((1, 1), 2.0)
+    assert spring_ratios(plant, memory_of(plant), np.ones((2, 1)), np.ones((2, 1)), ratios) is ratios

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain import Plant
-from tactile_cube.drivetrain.effects.transmission import Backlash
+from tactile_cube.drivetrain.effects.transmission import Backlash, StiffeningElasticity
 from tactile_cube.drivetrain.signals import COMMAND, LEAD, LOOP_GAIN, MOTOR_POSITION, TORQUE
 from tactile_cube.measurement.replay.windows import SAFE, Windows
 
@@ -58,6 +58,36 @@ def free_way(plant: Plant, memory: Array, jump: Array, lead: Array, gain: Array)
         return np.zeros_like(jump)
     p = plant.view(memory, "parameters:backlash")
     return Backlash.free_lead(lead, p, gain) - Backlash.free_lead(lead - jump, p, gain)
+
+
+def spring_ratios(
+    plant: Plant, memory: Array, jump: Array, torque: Array, ratios: tuple[Array, Array]
+) -> tuple[Array, Array]:
+    """Return the `ratios` of `jump_ratio` for each reading (..., n): a stiffening spring yields less the more it bears.
+
+    What passes of the command's lead over the joint is the deflection and the torque over kp. At once passes as much of
+    a jump as the ratios say together. Memory is (..., size); `jump` [rad] and the `torque` after it [N m] are (..., n).
+    """
+    if StiffeningElasticity not in plant.effects:
+        return ratios
+    soft, cubic = np.moveaxis(plant.view(memory, "parameters:stiffening_elasticity"), -1, 0)
+    kp, compliance = plant.view(memory, "kp"), plant.view(memory, "compliance") + soft
+    stiffening = (cubic > 0.0) & (compliance > 0.0) & (jump != 0.0)
+    if not stiffening.any():
+        return ratios
+    linear, cubic = 1.0 / np.where(compliance > 0.0, compliance, 1.0), np.where(cubic > 0.0, cubic, 1.0)
+    passed = (ratios[0] + ratios[1] / kp) * jump
+    after = cubic_root(linear, cubic, torque)
+    before = cubic_root(linear + kp, cubic, kp * after + torque - kp * passed)
+    position = (after - before) / np.where(stiffening, jump, 1.0)
+    found = position, kp * (passed / np.where(stiffening, jump, 1.0) - position)
+    return np.where(stiffening, found[0], ratios[0]), np.where(stiffening, found[1], ratios[1])
+
+
+def cubic_root(linear: Array, cubic: Array, load: Array) -> Array:
+    """Return the real root d of cubic * d^3 + linear * d = load (Cardano)."""
+    half_width = np.sqrt(linear / cubic / 3.0)
+    return np.asarray(2.0 * half_width * np.sinh(np.arcsinh(1.5 * load / (linear * half_width)) / 3.0))
 
 
 FEWEST = 3  # steps of a row of which two feel nothing of the row before

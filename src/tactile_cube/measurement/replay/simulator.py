@@ -28,7 +28,7 @@ from tactile_cube.measurement.recordings.description import KnownForce
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Array, Trial
 from tactile_cube.measurement.replay.model import Model
-from tactile_cube.measurement.replay.read_out import before_steps, free_way, gaps, jump_ratio, read_out, simulated_jumps
+from tactile_cube.measurement.replay.read_out import before_steps, free_way, gaps, jump_ratio, read_out, simulated_jumps, spring_ratios
 from tactile_cube.measurement.replay.windows import SMOOTHING, START_SPEED, Windows, asks_for_much, whole_trials
 
 CLAMPED = 1e9  # [N m] brake torque of a clamped link
@@ -195,6 +195,7 @@ class Simulator:
         jump = simulated_jumps(signals[:, :, 2], windows)
         shown = signals[:, :: windows.substeps]
         free = free_way(self.plant, memory[:, None], jump, shown[:, :, 4], shown[:, :, 5]) if gap.any() else 0.0
+        ratios = spring_ratios(self.plant, memory[:, None], jump, shown[:, :, 1], ratios)
         position, torque = read_out(shown[:, :, 0], shown[:, :, 1], jump, ratios, limit, free)
         far = asks_for_much(jump, self.plant.view(memory, "kp")[:, None], limit)
         if far.any():
