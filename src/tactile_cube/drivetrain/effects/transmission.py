@@ -137,7 +137,7 @@ class StiffeningElasticity(Effect):
     contains: ClassVar[Simpler] = {"elasticity": {"cubic": 0.0}}
     parameters = (
         Parameter("compliance", "rad/(N m)", 0.0, 0.0, 2.0, 0.1, "slack tendons: 2-20 N m/rad"),
-        Parameter("cubic", "N m/rad^3", 0.0, 0.0, 10000000.0, 2000.0, "as large as the linear part at 10-50 mrad"),
+        Parameter("cubic", "N m/rad^3", 0.0, 0.0, 1e12, 2000.0, "as large as the linear part at 0.1-50 mrad"),
     )
 
     forms = ({"compliance": 0.1, "cubic": 2e3},)

@@ -79,7 +79,8 @@ def term_unknowns(term: Term, place: int, sizes: Sizes | None = None) -> tuple[U
     joint = (sizes or {}).get(term.joint, FINGER)
     parameters = term.effect.parameters_at(joint)
     known = {name: abs(term.values[name]) for name in term.fitted}
-    known = {n: size if size < NO_SIZE * joint.of(parameters[n].unit) else 0.0 for n, size in known.items()}
+    far = {n: p.neutral != 0.0 and known.get(n, 0.0) >= NO_SIZE * joint.of(p.unit) for n, p in parameters.items()}
+    known = {n: 0.0 if far[n] else size for n, size in known.items()}
     scales = {name: known[name] or abs(parameters[name].typical) for name in term.fitted}
     fallback = max([size for size in scales.values() if size > 0.0], default=1.0)
     return tuple(
