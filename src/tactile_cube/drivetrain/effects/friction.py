@@ -5,7 +5,7 @@ from math import exp, inf
 from typing import ClassVar
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Scales, Simpler, Stage
-from tactile_cube.drivetrain.signals import DAMPING, DIRECTION, FRICTION, JOINT_TORQUE, TIME, TORQUE, VELOCITY
+from tactile_cube.drivetrain.signals import DAMPING, DIRECTION, FRICTION, JOINT_TORQUE, LOAD, TIME, TORQUE, VELOCITY
 
 
 class CoulombFriction(Effect):
@@ -148,6 +148,10 @@ class FrictionDrift(Effect):
         return max(x[FRICTION, j] + p[2] + p[0] * (1.0 - exp(-x[TIME, 0] / p[1])), 0.0)
 
 
+FOLLOWED = 5.0  # steps of unseen motion, as long as the present one, that bristles have followed
+TINY = 1e-12  # [N m]
+
+
 class PreslidingFriction(Effect):
     """Dry friction on bristles, which act as a spring before the joint slides (Dahl, LuGre).
 
@@ -177,15 +181,23 @@ class PreslidingFriction(Effect):
         {"breakaway": 0.003, "excess": 0.02, "micro_damping": 0.1},
     )
 
-    state_size = 1  # the bristle deflection z, -1 to 1
+    state_size = 2  # the bristle deflection z, -1 to 1; whether it is still to be found from the torques of the step
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the rigid friction limit that remains [N m]; add the bristles' torque to the joint torque."""
+        """Return the rigid friction limit that remains [N m]; add the bristles' torque to the joint torque.
+
+        Bristles whose past is not known hold a joint at rest where it is; one that moves they follow.
+        """
         if p[0] <= 0.0:
             return x[FRICTION, j] + p[1]
         limit = max(x[FRICTION, j] + p[1], 0.0)
         direction = 1.0 if x[VELOCITY, j] >= 0.0 else -1.0
+        if s[1] > 0.0:
+            s[1] = 0.0
+            balance = (x[TORQUE, j] + x[JOINT_TORQUE, j] - x[LOAD, j]) / max(limit, TINY)
+            balance = min(max(balance, -1.0), 1.0)
+            s[0] = direction + (balance - direction) * exp(-abs(x[VELOCITY, j]) * FOLLOWED * dt / p[0])
         s[0] = direction + (s[0] - direction) * exp(-abs(x[VELOCITY, j]) * dt / p[0])
         drag = p[2] * (1.0 - direction * s[0])
         x[DAMPING, j] += drag

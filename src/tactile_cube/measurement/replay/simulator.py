@@ -17,6 +17,7 @@ from tactile_cube.drivetrain import DrivetrainConstants, Plant
 from tactile_cube.drivetrain.effects.catalogue import catalogue
 from tactile_cube.drivetrain.effects.command import IntegralAction
 from tactile_cube.drivetrain.effects.effect import Effect, Stage
+from tactile_cube.drivetrain.effects.friction import PreslidingFriction
 from tactile_cube.drivetrain.effects.transmission import Backlash, smooth_lead
 from tactile_cube.drivetrain.plant import TREE_KEYS
 from tactile_cube.drivetrain.signals import COMMAND, LEAD, LOOP_GAIN, MOTOR_POSITION, POSITION, TORQUE
@@ -28,7 +29,15 @@ from tactile_cube.measurement.recordings.description import KnownForce
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Array, Trial
 from tactile_cube.measurement.replay.model import Model
-from tactile_cube.measurement.replay.read_out import before_steps, free_way, gaps, jump_ratio, read_out, simulated_jumps, spring_ratios
+from tactile_cube.measurement.replay.read_out import (
+    before_steps,
+    free_way,
+    gaps,
+    jump_ratio,
+    read_out,
+    simulated_jumps,
+    spring_ratios,
+)
 from tactile_cube.measurement.replay.windows import SMOOTHING, START_SPEED, Windows, asks_for_much, whole_trials
 
 CLAMPED = 1e9  # [N m] brake torque of a clamped link
@@ -269,6 +278,7 @@ class Simulator:
                 resting = np.average(measured, axis=0, weights=windows.weight[k, :, 0])
                 self.plant.view(memory, "external_torque")[k] = force_torque(self.tree, force, resting)
         wind_up(self.plant, model, windows, memory)
+        self.plant.view(memory, f"state:{PreslidingFriction.name}")[windows.time > 0.0, :, 1] = 1.0
         return memory
 
     def _jump_ratios(self, memory: Array, windows: Windows) -> tuple[Array, Array]:
