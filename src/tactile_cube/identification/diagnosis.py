@@ -15,11 +15,13 @@ from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.disturbances import Disturbance, disturbances, in_time, undisturbed
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit
 from tactile_cube.identification.fitting.problem import Problem
-from tactile_cube.identification.fitting.resolution import Fitted, resolved
+from tactile_cube.identification.fitting.resolution import Fitted, needless, resolved
 from tactile_cube.identification.next_experiment import Experiment, next_experiment
-from tactile_cube.identification.search.evidence import HeldOut, gain, judge
-from tactile_cube.identification.search.explanation import Explanation, Proposal
+from tactile_cube.identification.search.candidates import first_term
+from tactile_cube.identification.search.evidence import HeldOut, gain, judge, worse
+from tactile_cube.identification.search.explanation import Explanation, Proposal, named
 from tactile_cube.identification.search.findings import CommonOffset, Findings, common_offsets, find
+from tactile_cube.identification.search.proposals import without
 from tactile_cube.identification.search.search import BestSoFar, Search
 from tactile_cube.identification.standard_model import StandardModel, fit_standard_model
 from tactile_cube.identification.verdict import Simulations, Unexplained, Verdict, decide
@@ -232,13 +234,13 @@ def diagnose_recording(
     say.answer, say.following = first.partition(";")[0], "the stated model with its constants refitted"
     say(first)
     inquiry, left_out, suspected = beside_disturbances(replace(whole, standard=standard.proposal))
-    search, findings, simulations, verdict = inquiry.answer
+    search, findings, simulations, _ = answer = inquiry.answer
     if findings.stopped:
         say(f"stopped early, after {search.shooting.simulated:.0f} s of simulated trials; next: {findings.stopped}")
     _, held_out, tested = inquiry.parts
     test = held_out if tested is None else tested
     untouched = HeldOut(search.shooting, test, search.noise, nominal_model(test, known).offsets)
-    verdict = no_worse(verdict, standard, search, simulations, untouched)
+    verdict = no_worse(without_needless(answer), standard, search, simulations, untouched)
 
     def tested_with(chosen: Explanation) -> tuple[dict[str, ErrorSummary], dict[str, float]]:
         models = {"refitted": findings.base.fit.model, "with_effects": simulations.final(chosen).model}
@@ -278,6 +280,26 @@ def diagnose_recording(
     extended = not diagnosis.rivals
     experiment = next_experiment(search.shooting, inquiry.recording, fits, search.noise, seed, criteria, extended)
     return replace(diagnosis, experiment=experiment)
+
+
+def without_needless(answer: Answer) -> Verdict:
+    """Return the verdict without the effects whose final intervals hold what changes nothing.
+
+    It stays as it is if the others predict the held-out trials worse alone.
+    """
+    search, findings, simulations, verdict = answer
+    chosen = verdict.chosen
+    final = simulations.final(chosen)
+    out = needless(final.model, final.fit, final.half_width, len(search.start.terms))
+    first = [first_term(final.model, chosen.effects, place) for place in range(len(chosen.effects))]
+    idle = [k for k, one in enumerate(chosen.effects) if out.issuperset(range(first[k], first[k] + len(one.joints)))]
+    if not idle or len(idle) == len(chosen.effects):
+        return verdict
+    less = search.explained(without(search, Proposal(chosen.effects, chosen.fit), *idle), findings.looked)
+    if worse(less.judgement, chosen.judgement, search.criteria):
+        return verdict
+    rivals = tuple(one for one in verdict.rivals if named(one) != named(less))
+    return Verdict("missing_effect" if verdict.kind == "ambiguous" and not rivals else verdict.kind, less, rivals)
 
 
 def no_worse(

@@ -20,9 +20,9 @@ from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.drivetrain.effects.effect import Effect, Scales
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.criteria import STANDARD
-from tactile_cube.identification.fitting.gauss_newton import Fit, fit, precision
+from tactile_cube.identification.fitting.gauss_newton import Fit, fit
 from tactile_cube.identification.fitting.problem import Problem, Shooting
-from tactile_cube.identification.fitting.resolution import NORMAL_95, standard_errors
+from tactile_cube.identification.fitting.resolution import NORMAL_95, needless, standard_errors
 from tactile_cube.identification.fitting.unknowns import base_unknowns, every_effect
 from tactile_cube.identification.search.candidates import Candidate, model_unknowns
 from tactile_cube.identification.search.evidence import HeldOut
@@ -206,10 +206,16 @@ class _Fitting:
     def needed(self, best: _Tried) -> _Tried:
         """Remove the effects that are as stated, then those in proportion with a torque constant."""
         assert best.fit is not None, "what is stated has nothing to take out"
-        best = self.without(best, needless(best, len(self.start.terms)))
+        best = self.without(best, self.needless(best))
         plain = {t.label for t in best.model.terms[len(self.start.terms) :] if t.effect.name in IN_PROPORTION}
         fewer = self.without(best, plain)
-        return self.without(fewer, needless(fewer, len(self.start.terms))) if fewer is not best else best
+        return self.without(fewer, self.needless(fewer)) if fewer is not best else best
+
+    def needless(self, tried: _Tried) -> set[str]:
+        """Return the added effects that are as stated."""
+        assert tried.fit is not None, "what is stated has no covariance"
+        terms = tried.model.terms
+        return {terms[k].label for k in needless(tried.model, tried.fit, tried.half_width, len(self.start.terms))}
 
     def without(self, best: _Tried, labels: set[str]) -> _Tried:
         """Refit the model without some effects; return it unchanged if that is worse."""
@@ -245,32 +251,6 @@ class _Tried:
     rows: int = 0
     fit: Fit | None = None
     half_width: Array = field(default_factory=lambda: np.zeros(0))
-
-
-def needless(tried: _Tried, first: int) -> set[str]:
-    """Return the effects from the term `first` on that are as stated, the least certain of a joint taken out first.
-
-    What the others become without it follows from the fit's covariance, as large as its intervals say (Wald's test).
-    """
-    assert tried.fit is not None, "what is stated has no covariance"
-    places = np.array([u.place if u.kind == "effect" else -1 for u in tried.fit.unknowns])
-    width = np.maximum(tried.half_width, np.finfo(float).tiny)
-    away = np.array([u.of(tried.model) - u.neutral for u in tried.fit.unknowns]) / width
-    inverse = np.linalg.pinv(tried.fit.information + np.diag(precision(tried.fit.unknowns)), hermitian=True)
-    spread = np.sqrt(np.maximum(np.diag(inverse), np.finfo(float).tiny))
-    covariance = inverse / np.outer(spread, spread)
-    left, out = set(range(first, len(tried.model.terms))), set[str]()
-    while left:
-        sure = np.abs(away) / np.sqrt(np.maximum(np.diag(covariance), np.finfo(float).eps))
-        doubt = {place: float(sure[places == place].max()) for place in left}
-        least = min(doubt, key=doubt.__getitem__)
-        if doubt[least] >= 1.0:
-            return out
-        own = places == least
-        gain = covariance[:, own] @ np.linalg.pinv(covariance[np.ix_(own, own)], hermitian=True)
-        away, covariance = away - gain @ away[own], covariance - gain @ covariance[own]
-        left, out = left - {least}, out | {tried.model.terms[least].label}
-    return out
 
 
 def certainties(model: Model, found: Fit, half_width: Array) -> dict[int, float]:

@@ -201,6 +201,32 @@ def standard_errors(problem: Problem, fitted: Fit) -> Array:
     return np.asarray(np.sqrt(np.maximum(np.diag(robust), variance * np.diag(inverse))))
 
 
+def needless(model: Model, fitted: Fit, half_width: Array, first: int) -> set[int]:
+    """Return the terms from `first` on whose numbers may be what changes nothing, the least certain taken out first.
+
+    What the others become without it follows from the fit's covariance, as large as its intervals (P,) say (Wald's
+    test).
+    """
+    places = np.array([u.place if u.kind == "effect" else -1 for u in fitted.unknowns])
+    width = np.maximum(half_width, np.finfo(float).tiny)
+    away = np.array([u.of(model) - u.neutral for u in fitted.unknowns]) / width
+    inverse = np.linalg.pinv(fitted.information + np.diag(precision(fitted.unknowns)), hermitian=True)
+    spread = np.sqrt(np.maximum(np.diag(inverse), np.finfo(float).tiny))
+    covariance = inverse / np.outer(spread, spread)
+    left, out = set(range(first, len(model.terms))), set[int]()
+    while left:
+        sure = np.abs(away) / np.sqrt(np.maximum(np.diag(covariance), np.finfo(float).eps))
+        doubt = {place: float(sure[places == place].max(initial=0.0)) for place in left}
+        least = min(doubt, key=doubt.__getitem__)
+        if doubt[least] >= 1.0:
+            return out
+        own = places == least
+        gain = covariance[:, own] @ np.linalg.pinv(covariance[np.ix_(own, own)], hermitian=True)
+        away, covariance = away - gain @ away[own], covariance - gain @ covariance[own]
+        left, out = left - {least}, out | {least}
+    return out
+
+
 def bounds(fitted: Fitted) -> dict[tuple[str, str, int, int], tuple[float, float, float]]:
     """Return (kind, key, place, initialisation) -> value and interval, cut at the unknown's own bounds.
 

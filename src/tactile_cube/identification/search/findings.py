@@ -108,8 +108,6 @@ def find(search: Search, standard: Proposal | None = None) -> Findings:
     The field's `standard` model is one of the sets; where it is better than each law and pair, the search goes on
     beside it.
     """
-    if search.base.largest_error > search.criteria.adequate and not off(search, search.base.fit):
-        search.focus()
     base, nominal = search.base, search.judged(search.start)
     search.say(f"base refitted: held-out error {base.error:.2f} x sensor noise")
     if base.largest_error <= search.criteria.floor:

@@ -109,7 +109,20 @@ class Search:
 
     @cached_property
     def base(self) -> Explanation:
-        """Model with refitted constants, or as stated if that predicts the held-out trials better."""
+        """Model with refitted constants, or as stated if that predicts the held-out trials better.
+
+        Where it fails, `problem` takes the windows in which it fails most: rare failures may be in none of the others.
+        """
+        found = self._base()
+        if found.largest_error <= self.criteria.adequate:
+            return found
+        every, model = Problem(self.shooting, self.all_windows), found.fit.model
+        every.linearise_starts(model)
+        costs = every.cost(every.residual(every.prediction(model)))
+        self.problem = Problem(self.shooting, failing(self.all_windows, costs, self.segments // FITTED))
+        return self._base()
+
+    def _base(self) -> Explanation:
         self.problem.linearise_starts(self.start)
         first = fit(self.problem, self.start, self.unknowns(self.start), iterations=4)
         self.problem.linearise_starts(first.model)
@@ -120,14 +133,6 @@ class Search:
         judgement = self.judged(second.model)
         self.offsets = dict(judgement.model.offsets)
         return Explanation((), second, judgement, 1.0, 0.0)
-
-    def focus(self) -> None:
-        """Fit windows of all trials in which the base model fails, as rare failures may be in none of those fitted."""
-        every, model = Problem(self.shooting, self.all_windows), self.base.fit.model
-        every.linearise_starts(model)
-        costs = every.cost(every.residual(every.prediction(model)))
-        self.problem = Problem(self.shooting, failing(self.all_windows, costs, self.segments // FITTED))
-        del self.base
 
     def windows(self, recording: Recording) -> Windows:
         """Return shooting windows of other trials, cut in the same way."""
