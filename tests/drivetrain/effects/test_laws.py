@@ -541,3 +541,14 @@ def test_a_search_begins_with_little_mass_and_with_that_of_a_counterweight_and_a
 def test_where_a_joint_slides_it_does_not_matter_how_far_out_the_tool_is() -> None:
     starts = Payload.starts_at(replace(FINGER, mass=2.0, lever=0.5, slides=True))
     assert all(set(one) == {"mass"} for one in starts)
+
+
+@pytest.mark.parametrize(("speed", "bend"), [(0.0, 0.7), (50.0, 1.0), (-50.0, -1.0)])
+def test_bristles_of_an_unknown_past_balance_a_joint_at_rest_and_follow_one_that_moves(speed: float, bend: float):
+    """Of 0.07 N m that pull at a joint bristles bear all, as 0.1 N m is the friction's limit."""
+    x = np.full((ROWS, 3), nan)
+    x[[VELOCITY, FRICTION, TORQUE, JOINT_TORQUE, LOAD, DAMPING], 1] = speed, 0.1, 0.05, 0.03, 0.01, 1.0
+    state = np.array([0.0, 1.0])
+    catalogue()["presliding_friction"].law(x, 1, np.array([1e-3, 0.0, 0.0]), state, DT)
+    assert state == pytest.approx([bend, 0.0])
+    assert x[JOINT_TORQUE, 1] == pytest.approx(0.03 - 0.1 * bend)
