@@ -60,10 +60,12 @@ def simulated(
     wound: float = 0.0,
     repeats: int = 2,
     every: float = 0.0,
+    balanced: bool = True,
 ) -> Recording:
     """Trials of two kinds, each repeated, of a rig with a hidden effect (its values at the size wanted).
 
     An integral of its controller begins `wound` [N m] beyond balance. A trial begins `every` so many seconds.
+    Bristles of its friction begin `balanced` or unbent.
     """
     stated = _stated(size)
     trials = [
@@ -92,7 +94,7 @@ def simulated(
     planned = read_recording(folder)
     shooting = Shooting(planned, EFFECTS)
     windows = cut(planned, np.ones(1), segment=SAMPLES, time=shooting.time)
-    windows = replace(windows, wound=np.full_like(windows.wound, wound))
+    windows = replace(windows, wound=np.full_like(windows.wound, wound), balanced=windows.balanced & balanced)
     plain = nominal_model(planned)
     known = effect("a", **values)
     model = Model(plain.constants, (Term(effect, "a", known.values, ()),), plain.offsets)

@@ -147,10 +147,24 @@ class Problem:
         """Take the initial states of trials and the sensitivity to segment starts from this model from now on."""
         self.windows = with_initial_states(self.shooting, model, self.windows)
         self._linearise_segments(model)
+        if self.shooting.bristled(model):
+            self._choose_balance(model)
         for _ in range(REWOUND if (joints := self.shooting.integrating(model)) else 0):
             wound = self.windows.wound.copy()
             wound[:, joints] += self._more_wound(model, joints)
             self.windows = replace(self.windows, wound=wound)
+
+    def _choose_balance(self, model: Model) -> None:
+        """Begin each trial with its bristles balanced or unbent, as its first segment says."""
+        first = self.windows.time == 0.0
+        other = replace(self.windows, balanced=self.windows.balanced ^ first[:, None])
+        costs = [
+            self.cost(self.residual(self.windows.by_segment(position[0])))[:: self.windows.segments]
+            for position in self.shooting.simulate([model] * 2, [self.windows, other])
+        ]
+        if (wrong := first & (costs[1] < costs[0])).any():
+            self.windows = replace(self.windows, balanced=self.windows.balanced ^ wrong[:, None])
+            self._linearise_segments(model)
 
     def _more_wound(self, model: Model, joints: list[int]) -> Array:
         """Estimate the missing wind-up (S, joints) of integrals at each trial's start, which no log shows [N m]."""

@@ -166,6 +166,10 @@ class Simulator:
         """Return the width of the gap in each joint's transmission (n,) [rad]."""
         return gaps(self.plant, self.memory(model))
 
+    def bristled(self, model: Model) -> bool:
+        """Return whether the friction of a joint has bristles."""
+        return any(t.effect is PreslidingFriction and t.values["breakaway"] > 0.0 for t in model.terms)
+
     def integrating(self, model: Model) -> list[int]:
         """Return the joints whose controller integrates its error."""
         return integrating_joints(model, self.plant.joint_names)
@@ -278,7 +282,7 @@ class Simulator:
                 resting = np.average(measured, axis=0, weights=windows.weight[k, :, 0])
                 self.plant.view(memory, "external_torque")[k] = force_torque(self.tree, force, resting)
         wind_up(self.plant, model, windows, memory)
-        self.plant.view(memory, f"state:{PreslidingFriction.name}")[windows.time > 0.0, :, 1] = 1.0
+        self.plant.view(memory, f"state:{PreslidingFriction.name}")[..., 1] = windows.balanced
         return memory
 
     def _jump_ratios(self, memory: Array, windows: Windows) -> tuple[Array, Array]:

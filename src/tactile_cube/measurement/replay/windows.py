@@ -54,6 +54,7 @@ class Windows:
         clamped: (S,) the links were held still.
         initial_state: (S, 2 n) how far links stand from where their sensors put them as the window begins [rad], and
             how much faster they are [rad/s]; see `initial_states`.
+        balanced: (S, n) friction's bristles balance the load as the window begins; they are unbent otherwise.
         trial_start: (S, 3, n) position, command [rad] and speed [rad/s] of the trial's first step.
         wound: (S, n) what the integral of a controller holds beyond balance as the trial begins [N m].
         errors: of each window, (rows before it, 2, n): errors of the trial's position times the sampling step [rad s],
@@ -80,6 +81,7 @@ class Windows:
     begun: Array
     clamped: NDArray[np.bool_]
     initial_state: Array
+    balanced: NDArray[np.bool_]
     trial_start: Array
     wound: Array
     errors: tuple[Array, ...]
@@ -118,7 +120,7 @@ class Windows:
         return values.reshape(len(self) * self.segments, -1)
 
 
-ROWS = tuple(field.name for field in fields(Windows))[:17]  # arrays with one row a window
+ROWS = tuple(field.name for field in fields(Windows))[:18]  # arrays with one row a window
 
 
 def cut(
@@ -230,6 +232,7 @@ def _pieces(recording: Recording, trial: Trial, index: int, sizes: Cut) -> Itera
             "begun": trial.begun,
             "clamped": trial.clamped,
             "initial_state": np.zeros(2 * position.shape[1]),
+            "balanced": np.ones(position.shape[1], dtype=bool),
             "trial_start": trial_start,
             "wound": np.zeros(position.shape[1]),
             "errors": errors[:first],

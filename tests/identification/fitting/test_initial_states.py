@@ -1,4 +1,4 @@
-"""An integral of a controller, where a log begins out of balance and segments begin in the middle of it."""
+"""Integrals of controllers and bristles of friction, where a log begins out of balance or segments in the middle."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +12,7 @@ from tactile_cube.measurement.replay.model import Model, Term, nominal_model
 from tactile_cube.measurement.replay.simulator import integrated
 from tests.identification.rigs_of_any_size import EFFECTS, NOISE, Size, simulated
 
-INTEGRAL = find_effect("integral_action")
+INTEGRAL, PRESLIDING = find_effect("integral_action"), find_effect("presliding_friction")
 
 
 @pytest.mark.parametrize("values", [{"ki": 2.0}, {"ki": 2.0, "lag": 0.06}])
@@ -35,6 +35,21 @@ def test_windows_that_begin_later_know_what_the_integral_has_come_to(values: dic
     problem.windows = replace(problem.windows, errors=tuple(0.0 * one for one in problem.windows.errors))
     assert error() > 10.0
     assert problem.chosen_numbers(true).sum() == len(recording.trials), "one number was chosen for each trial"
+
+
+@pytest.mark.parametrize("balanced", [True, False])
+def test_bristles_begin_as_the_first_segments_say(balanced: bool, tmp_path: Path) -> None:
+    values = {"breakaway": 0.01, "excess": 0.1}
+    recording = simulated(tmp_path, Size(), PRESLIDING, values, balanced=balanced)
+    shooting = Shooting(recording, EFFECTS)
+    problem = Problem(shooting, shooting.cut(recording, np.array([NOISE])))
+    plain = nominal_model(recording)
+    true = Model(plain.constants, (Term(PRESLIDING, "a", values, ()),), plain.offsets)
+    problem.linearise_starts(true)
+    begun = problem.windows.balanced[problem.windows.time == 0.0, 0].tolist()
+    assert begun[1::2] == [balanced, balanced], "triangles; as sines begin the load is balanced anyway"
+    cost = problem.cost(problem.residual(problem.prediction(true))).sum()
+    assert np.sqrt(cost / np.count_nonzero(problem.weight)) == pytest.approx(1.0, abs=0.1)
 
 
 def test_an_integral_stops_at_its_limit_and_comes_back_at_once() -> None:
