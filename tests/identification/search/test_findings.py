@@ -8,7 +8,6 @@ import pytest
 
 from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.identification.criteria import Criteria
-from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.search.candidates import Candidate
 from tactile_cube.identification.search.explanation import named_by
 from tactile_cube.identification.search.findings import find, together
