@@ -30,7 +30,7 @@ from tactile_cube.identification.search.explanation import Proposal
 from tactile_cube.identification.search.search import some
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model, Term, nominal_model
-from tactile_cube.measurement.replay.windows import Windows
+from tactile_cube.measurement.replay.windows import Windows, between_steps
 from tactile_cube.measurement.units import milli
 
 Array = NDArray[np.float64]
@@ -176,8 +176,9 @@ class _Fitting:
         return best
 
     def rows_of(self, seconds: float) -> int:
-        """Return the rows of a window of so many seconds at a finger, scaled to the machine's time."""
-        return round(seconds * self.shooting.time / self.recording.step)
+        """Return the rows of a window of about so many seconds at a finger, scaled to the machine's time."""
+        rows = round(seconds * self.shooting.time / self.recording.step)
+        return between_steps(self.recording.trials, rows, self.shooting.time)
 
     def robust(self, model: Model, rows: int, rounds: int = ROUNDS) -> _Tried:
         """Fit in windows of so many rows with a soft-L1 loss, by iterative reweighting."""

@@ -7,7 +7,7 @@ import pytest
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
-from tactile_cube.measurement.replay.windows import Drive, _half_width, _states, cut, steps_per_row
+from tactile_cube.measurement.replay.windows import Drive, _half_width, _states, between_steps, cut, steps_per_row
 from tests.measurement.small_rig import write
 
 NO_ROWS = np.zeros(0, dtype=np.int64)
@@ -106,6 +106,22 @@ def test_a_segment_that_begins_just_after_a_step_of_the_command_weighs_nothing(r
 def test_where_most_segments_begin_just_after_a_step_they_all_count(recording: Recording) -> None:
     windows = cut(recording, np.array([2e-4, 2e-4]), [stepped(recording, 10)], segment=10)
     assert windows.weight[0, :80].all()
+
+
+def test_segments_do_not_begin_as_a_command_steps(recording: Recording) -> None:
+    """Steps every 0.8 s; of segments of 0.4 s every second one would begin as the command steps."""
+    trial = stepped(recording, round(0.8 / recording.step))
+    usual = round(0.4 / recording.step)
+    rows = between_steps([trial], usual)
+    assert 0 < abs(rows - usual) <= 0.1 * usual
+    late = (np.arange(0, len(trial.time), rows) * trial.step) % 0.8
+    before = (np.arange(0, len(trial.time), usual) * trial.step) % 0.8
+    assert np.count_nonzero(late < 0.1) < np.count_nonzero(before < 0.1)
+
+
+def test_a_segment_is_as_long_as_usual_where_no_command_moves(recording: Recording) -> None:
+    still = replace(recording.trials[0], command=0.0 * recording.trials[0].command)
+    assert between_steps([still], 100) == 100
 
 
 def test_the_impulse_of_a_step_asks_for_half_the_torque_there_is(recording: Recording) -> None:

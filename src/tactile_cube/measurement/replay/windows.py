@@ -28,6 +28,7 @@ NO_LINKS = np.zeros(0, dtype=np.int64)
 SMOOTHING = 0.025  # [s] half width of the polynomial that reads the speed at a segment's start
 START_SPEED = 0.02  # [rad/s] how well the speed at a segment's start is known beforehand
 SAFE = 0.25  # part of the torque limit below which the torque is proportional to a jump of the command
+ABOUT = 0.1  # part of its length by which a segment may be shorter or longer
 UNSTEADY = 0.125  # [s] after a step of the command: a drive's delay, and what a speed is read from
 MANY = 12  # samples around a start that suffice for a polynomial of fourth degree
 
@@ -138,7 +139,7 @@ def cut(
     """
     trials = recording.trials if trials is None else trials
     longest = max(len(trial.time) for trial in trials)
-    segment = min(segment or max(8, round(SEGMENT * time / recording.step)), longest)
+    segment = min(segment or between_steps(trials, max(8, round(SEGMENT * time / recording.step)), time), longest)
     rows = segment * min(WINDOW, -(-longest // segment))
     forward = max(rows - LEAD * segment, segment)  # from the start of a window to that of the next one
     history = min(round(HISTORY * time / recording.step), (longest - 1) // forward * forward)
@@ -147,6 +148,25 @@ def cut(
     joints = len(recording.joints)
     noise = noise[[*range(joints), *(joints + links)]]
     return _windows(recording, trials, Cut(rows, forward, segment, history, noise, time, speed, substeps, links))
+
+
+def between_steps(trials: Sequence[Trial], rows: int, time: float = 1.0) -> int:
+    """Return a segment's length, within a tenth of `rows`, with which fewest segments begin as a command has jumped.
+
+    Commands often jump at round times. What a drive does just then, above all within a gap, no measured start knows.
+    """
+    lengths = np.arange(rows - round(ABOUT * rows), rows + round(ABOUT * rows) + 1)
+    jumped = np.zeros(len(lengths))
+    for trial in trials:
+        jumps = np.abs(np.diff(trial.command, axis=0, prepend=trial.command[:1]))
+        size = (jumps / np.maximum(jumps.max(axis=0), np.finfo(float).tiny)).max(axis=1)
+        ended = np.concatenate([np.zeros(1), np.cumsum(size)])
+        for k, length in enumerate(lengths):
+            starts = np.arange(0, len(size), length)[1:]
+            before = np.maximum(starts - round(UNSTEADY * time / trial.step), 0)
+            jumped[k] += np.sum(ended[starts + 1] - ended[before + 1])
+    order = np.argsort(np.abs(lengths - rows), kind="stable")
+    return int(lengths[order[np.argmin(jumped[order])]])
 
 
 def whole_trials(
