@@ -45,7 +45,8 @@ def test_where_a_row_is_one_step_the_jump_tells_the_later_command(tmp_path: Path
 
 def test_the_interval_reaches_from_the_value_of_coarse_steps_to_that_of_the_finer_world(tmp_path: Path) -> None:
     recording = read(tmp_path)
-    shooting, windows, truth = Shooting(recording, EFFECTS), cut(recording, SMALL), nominal_model(recording)
+    shooting, truth = Shooting(recording, EFFECTS), nominal_model(recording)
+    windows = cut(recording, SMALL, segment=40)
     world = shooting.finer(FINER).positions([truth], finer(windows, FINER))[0]
     problem = Problem(shooting, replace(windows, measured=world))
     unknowns = base_unknowns(recording, truth.constants, shooting.sizes)
