@@ -1,5 +1,6 @@
 """Starts that are read from what a fit leaves."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -36,12 +37,37 @@ def test_a_profile_starts_at_the_torque_that_is_missing() -> None:
         assert EFFECT.law(x, 0, values, np.zeros(0), 0.002) == pytest.approx(detent(angle), abs=0.006)
 
 
+def moved(torque: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]) -> Missing:
+    """What a torque of position, velocity and acceleration leaves of a swing, with noise and a slope."""
+    time = np.linspace(0.0, 40.0, 6000)
+    position, velocity, acceleration = 0.9 * np.sin(time) + 0.2, 0.9 * np.cos(time), -0.9 * np.sin(time)
+    missing = torque(position, velocity, acceleration)
+    noise = 0.5 * missing.std() * np.random.default_rng(1).normal(size=len(time))
+    signals = {"position of a [rad]": position, "velocity of a [rad/s]": velocity}
+    signals["acceleration of a [rad/s^2]"] = acceleration
+    none = np.zeros(len(time), dtype=np.int64)
+    return Missing("a", missing + noise + 2.0 * missing.std() * position, signals, none, none)
+
+
 @pytest.mark.parametrize("harmonic", [6.0, 24.7, 91.0])
 def test_the_strongest_peak_is_the_harmonic_that_was_put_in(harmonic: float) -> None:
-    rng = np.random.default_rng(1)
-    position = 0.9 * np.sin(np.linspace(0.0, 40.0, 6000)) + 0.2
-    torque = 0.02 * np.sin(harmonic * position) - 0.01 * np.cos(harmonic * position)
-    noisy = torque + 0.01 * rng.normal(size=len(position)) + 0.05 * position
-    found, sine, cosine = peaks(position, noisy, np.ones_like(position), np.zeros(6000, dtype=np.int64))[0]
+    missing = moved(lambda q, v, a: 0.02 * np.sin(harmonic * q) - 0.01 * np.cos(harmonic * q))
+    found, sine, cosine = peaks(missing)[0]
     assert found == pytest.approx(harmonic, abs=0.6)
     assert np.hypot(sine, cosine) == pytest.approx(np.hypot(0.02, 0.01), rel=0.35)
+
+
+@pytest.mark.parametrize("harmonic", [6.0, 24.7])
+@pytest.mark.parametrize("response", [(0.3, 0.0), (0.0, 0.01), (0.1, 0.01)])
+def test_an_error_of_the_sensor_is_found_by_what_damping_and_inertia_make_of_it(harmonic, response) -> None:
+    """The error is 2 sin(n q) - cos(n q) [mrad]."""
+
+    def torque(q, v, a):
+        sine, cosine, n = np.sin(harmonic * q), np.cos(harmonic * q), harmonic
+        slope = 2e-3 * cosine + 1e-3 * sine
+        bend = n * a * slope - (n * v) ** 2 * (2e-3 * sine - 1e-3 * cosine)
+        return response[0] * n * v * slope + response[1] * bend
+
+    found, sine, cosine = peaks(moved(torque), response)[0]
+    assert found == pytest.approx(harmonic, abs=0.6)
+    assert np.hypot(sine, cosine) == pytest.approx(np.hypot(2e-3, 1e-3), rel=0.35)

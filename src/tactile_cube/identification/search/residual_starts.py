@@ -18,7 +18,7 @@ from tactile_cube.measurement.replay.model import Model
 
 Array = NDArray[np.float64]
 HARMONIC = "harmonic"  # parameter [1/rad] by which an effect says that it repeats with the position
-LOWEST, HIGHEST = 2.5, 160.0  # [1/rad] of a finger
+LOWEST, HIGHEST = 1.25, 160.0  # [1/rad] of a finger: from a wave as long as its range of motion on
 RESOLUTION = 0.8  # grid step times the range of motion: finer than half a peak
 NARROWEST = 0.05  # [rad] range that is told apart by harmonics at all
 PEAKS = 2
@@ -39,34 +39,25 @@ def periodic_candidates(
         damping = float(model.constants["kd"][recording.joints.index(missing.joint)])
         scales = sizes[missing.joint]
         for effect in periodic:
-            moving = effect.stage is Stage.POSITION_SENSOR
+            if (moving := effect.stage is Stage.POSITION_SENSOR) and damping == 0.0:
+                continue  # commanded torques: no controller takes the sensor's error for motion
+            response = (damping, scales.inertia) if moving else None
             found += [
                 Candidate(effect, (missing.joint,), start, sizes)
                 for form in effect.forms_at(scales)
                 if HARMONIC in form
-                for start in _starts(missing, form, damping if moving else None, scales.of("1/rad"))
+                for start in _starts(missing, form, response, scales.of("1/rad"))
             ]
     return found
 
 
 def _starts(
-    missing: Missing, form: Mapping[str, float], damping: float | None, size: float
+    missing: Missing, form: Mapping[str, float], response: tuple[float, float] | None, size: float
 ) -> list[Mapping[str, float]]:
-    """Return the form at each strong harmonic, with the phase of the missing torque there.
-
-    A torque that repeats with the position appears directly; an error of the position sensor appears as its time
-    derivative, multiplied by the damping of the controller.
-    """
-    if damping == 0.0:  # commanded torques: no controller takes the sensor's error for motion
-        return []
-    position = missing.signals[f"position of {missing.joint} [rad]"]
-    speed = missing.signals[f"velocity of {missing.joint} [rad/s]"]
-    weight = np.ones_like(position) if damping is None else speed
+    """Return the form at each strong harmonic, with the phase of the missing torque there, see `peaks`."""
     starts: list[Mapping[str, float]] = []
     first, second = [name for name in form if name != HARMONIC][:2]
-    for harmonic, sine, cosine in peaks(position, missing.torque, weight, missing.initialisation, size):
-        if damping is not None:  # damping * d/dt (a sin + b cos) = damping * n v (a cos - b sin)
-            sine, cosine = cosine / (damping * harmonic), -sine / (damping * harmonic)
+    for harmonic, sine, cosine in peaks(missing, response, size):
         known = max(np.hypot(sine, cosine), 0.1 * abs(form[first]))
         angle = np.arctan2(cosine, sine)
         starts.append({**form, first: known * np.cos(angle), second: known * np.sin(angle), HARMONIC: harmonic})
@@ -74,27 +65,46 @@ def _starts(
 
 
 def peaks(
-    position: Array, torque: Array, weight: Array, initialisation: NDArray[np.int64], size: float = 1.0
+    missing: Missing, response: tuple[float, float] | None = None, size: float = 1.0
 ) -> list[tuple[float, float, float]]:
-    """Return strongest harmonics of the torque over the position: (harmonic, sine part, cosine part), strongest first.
+    """Return strongest harmonics of a wave over the position: (harmonic, sine part, cosine part), strongest first.
 
-    Each robot initialisation brings joint offsets that are not known well, so phases are compared within one only.
-    Harmonics go up to `size` times a finger's.
+    The wave is a torque, or with a `response` (damping [N m s/rad], inertia [kg m^2]) an error e of the position
+    sensor, which misses damping * e' + inertia * e''. Each robot initialisation brings joint offsets that are not known
+    well, so phases are compared within one only (Lomb-Scargle). Harmonics go up to `size` times a finger's.
     """
-    every = max(1, len(position) // MOST_SAMPLES)
-    q, t, w, group = position[::every], torque[::every], weight[::every], initialisation[::every]
+    every = max(1, len(missing.torque) // MOST_SAMPLES)
+    q, v, a = (
+        missing.signals[f"{name} of {missing.joint} [{unit}]"][::every]
+        for name, unit in (("position", "rad"), ("velocity", "rad/s"), ("acceleration", "rad/s^2"))
+    )
+    t, group = missing.torque[::every], missing.initialisation[::every]
     slow = np.vander((q - q.mean()) / max(np.ptp(q), 1e-9 / size), 4)
     t = t - slow @ np.linalg.lstsq(slow, t, rcond=None)[0]
     grid = np.arange(LOWEST * size, HIGHEST * size, RESOLUTION / max(np.ptp(q), NARROWEST / size))
     parts = [group == k for k in np.unique(group)]
-    spectrum = np.array([[np.dot((w * t)[part], np.exp(1j * n * q[part])) for part in parts] for n in grid])
-    power = np.sum(np.abs(spectrum) ** 2, axis=1)
+
+    def waves(n: float) -> Array:
+        """Return what a sine and a cosine of the position, of size 1, add to the torque (samples, 2)."""
+        wave = np.exp(1j * n * q)
+        if response is not None:
+            damping, inertia = response
+            wave *= damping * 1j * n * v + inertia * (1j * n * a - n**2 * v**2)
+        return np.stack([wave.imag, wave.real], axis=1)
+
+    power = np.zeros(len(grid))
+    for k, n in enumerate(grid):
+        columns = waves(float(n))
+        for part in parts:
+            own = columns[part]
+            pull = own.T @ t[part]
+            power[k] += pull @ np.linalg.lstsq(own.T @ own, pull, rcond=None)[0]
     inner = np.flatnonzero((power[1:-1] >= power[:-2]) & (power[1:-1] >= power[2:])) + 1
     strongest = inner[np.argsort(-power[inner])][:PEAKS]
     found = []
     for k in strongest:
-        waves = np.column_stack([w * np.sin(grid[k] * q), w * np.cos(grid[k] * q), slow])
-        sine, cosine = np.linalg.lstsq(waves, t, rcond=None)[0][:2]
+        columns = np.column_stack([waves(float(grid[k])), slow])
+        sine, cosine = np.linalg.lstsq(columns, t, rcond=None)[0][:2]
         found.append((float(grid[k]), float(sine), float(cosine)))
     return found
 
