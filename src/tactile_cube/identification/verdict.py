@@ -7,7 +7,7 @@ from typing import Literal
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.resolution import Fitted, final_fit
-from tactile_cube.identification.search.evidence import worse
+from tactile_cube.identification.search.evidence import likelihood, standing_out, worse
 from tactile_cube.identification.search.explanation import (
     Explanation,
     at_bound,
@@ -65,10 +65,16 @@ def decide(findings: Findings, criteria: Criteria = STANDARD) -> Verdict:
 
 
 def closest(found: Sequence[Explanation], findings: Findings, criteria: Criteria) -> Explanation:
-    """Return the explanation that predicts the held-out trials best."""
+    """Return the simplest explanation within a standard error of the one that predicts the held-out trials best.
+
+    What is missing is unknown, and effects that stand in for it may do harm in other motion. Source: Breiman, Friedman,
+    Olshen, Stone, Classification and regression trees, 1984 (the one-standard-error rule).
+    """
     unclear = [one for one in findings.judged if not proven(one, criteria) and not at_bound(one)]
     possible = [findings.base, *found, *unclear]
-    return min(possible, key=lambda one: one.judgement.costs.sum())
+    best = min(possible, key=lambda one: one.judgement.costs.sum()).judgement
+    alike = [one for one in possible if standing_out(likelihood(one.judgement, best), best) <= 1.0]
+    return min(alike, key=lambda one: (len(named(one)), one.size, one.judgement.costs.sum()))
 
 
 def find_rivals(
