@@ -7,8 +7,11 @@ import numpy as np
 
 from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.identification.criteria import STANDARD
-from tactile_cube.identification.diagnosis import Inquiry, beside_disturbances
-from tactile_cube.identification.search.explanation import named_by
+from tactile_cube.identification.diagnosis import Answer, Inquiry, beside_disturbances, without_needless
+from tactile_cube.identification.search.explanation import Proposal, named_by
+from tactile_cube.identification.search.findings import Findings
+from tactile_cube.identification.verdict import Simulations, Verdict
+from tactile_cube.measurement.comparing.noise_floor import noise_floor
 from tests.identification.rigs_of_any_size import STEP, Size, simulated
 
 PUSHED, START, END = 2, 1.2, 1.5  # number of the trial, [s]
@@ -31,3 +34,23 @@ def test_a_push_is_left_out_and_what_is_missing_beside_it_named(tmp_path: Path) 
     assert all(valid.all() for name, valid in kept.items() if name != one.trial)
     assert inquiry.answer.verdict.kind == "missing_effect"
     assert named_by(inquiry.answer.verdict.chosen.effects) == {("coulomb_friction", "a")}
+
+
+def test_an_effect_that_may_be_nothing_is_no_part_of_a_claim(tmp_path: Path) -> None:
+    dry, bias = find_effect("coulomb_friction"), find_effect("torque_bias")
+    recording = simulated(tmp_path, Size(), dry, {"friction": 0.16}, repeats=3)
+    search = Inquiry(recording, (dry, bias), 0, lambda line: None, None, STANDARD).search
+    model, effects = search.base.fit.model, tuple(one for one in search.candidates if one.effect in (dry, bias))
+    for one in effects:
+        model, _ = one.added_to(model)
+    both = search.explained(Proposal(effects, search.refitted(model)), 1)
+    alone = search.explained(Proposal(effects[:1], search.refitted(effects[0].added_to(search.base.fit.model)[0])), 1)
+    simulations = Simulations(search, search.base, noise_floor(recording))
+
+    def claimed(chosen) -> set[tuple[str, str]]:
+        findings = Findings(search.base, search.base.judgement, (chosen,))
+        answer = Answer(search, findings, simulations, Verdict("missing_effect", chosen))
+        return set(named_by(without_needless(answer).chosen.effects))
+
+    assert named_by(both.effects) == {("coulomb_friction", "a"), ("torque_bias", "a")}
+    assert claimed(both) == claimed(alone) == {("coulomb_friction", "a")}

@@ -66,6 +66,13 @@ def test_where_nothing_is_named_the_model_that_predicts_best_is_recommended() ->
     assert decide(findings(20.0, plain, replace(doubtful, fit=at_its_edge("payload")))).chosen == plain
 
 
+def test_where_nothing_is_named_more_effects_are_recommended_only_beyond_a_standard_error() -> None:
+    plain = explanation("backlash", 10.05, seed=1)
+    both = (*plain.effects, *explanation("payload", 10.0).effects)
+    best = replace(explanation("payload", 10.0, seed=2), effects=both)
+    assert decide(findings(20.0, plain, best)).chosen == plain
+
+
 def test_a_base_that_leaves_something_at_one_joint_is_not_adequate() -> None:
     found = findings(1.05)
     one_joint = replace(found.base.judgement, joint_errors=np.array([1.4, 1.0]))
