@@ -12,8 +12,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-OTHERWISE = {("coupling_error", "ratio"), ("friction_drift", "friction")}
-"""Numbers that mean something else in the generator: a whole ratio, a friction that is there at the start."""
+OTHERWISE = {("coupling_error", "ratio"), ("friction_drift", "friction"), ("asymmetric_friction", "friction")}
+"""Numbers that mean something else in the generator: a whole ratio, friction with the one that is stated."""
 
 
 def held(line: dict[str, Any]) -> Iterator[tuple[str, bool]]:
