@@ -148,8 +148,8 @@ def in_time(
     rows, (error, reading) = 0, _fitted(recording, effects, known)
     while reading < NEARER and rows < MOST_LATE:
         further, later = _fitted(_earlier(recording, rows + 1), effects, known)
-        if further > error:
-            break
+        if further**2 > (1.0 + STANDARD.least_gain) * error**2:
+            break  # where the error is alike, the time that is nearer to the stamps is taken
         rows, error, reading = rows + 1, further, later
     if not rows or (error > STANDARD.floor and not _late_beside_effects(recording, rows, effects, known)):
         return recording
