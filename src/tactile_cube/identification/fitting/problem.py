@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects.effect import Effect
+from tactile_cube.drivetrain.effects.friction import PreslidingFriction
 from tactile_cube.errors import InputError
 from tactile_cube.identification.fitting.unknowns import Unknown
 from tactile_cube.measurement.comparing.noise_floor import of_one_command
@@ -147,7 +148,7 @@ class Problem:
         """Take the initial states of trials and the sensitivity to segment starts from this model from now on."""
         self.windows = with_initial_states(self.shooting, model, self.windows)
         self._linearise_segments(model)
-        if self.shooting.bristled(model):
+        if any(t.effect is PreslidingFriction and t.values["breakaway"] > 0.0 for t in model.terms):
             self._choose_balance(model)
         for _ in range(REWOUND if (joints := self.shooting.integrating(model)) else 0):
             wound = self.windows.wound.copy()

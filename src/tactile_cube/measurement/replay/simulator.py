@@ -166,10 +166,6 @@ class Simulator:
         """Return the width of the gap in each joint's transmission (n,) [rad]."""
         return gaps(self.plant, self.memory(model))
 
-    def bristled(self, model: Model) -> bool:
-        """Return whether the friction of a joint has bristles."""
-        return any(t.effect is PreslidingFriction and t.values["breakaway"] > 0.0 for t in model.terms)
-
     def integrating(self, model: Model) -> list[int]:
         """Return the joints whose controller integrates its error."""
         return integrating_joints(model, self.plant.joint_names)
