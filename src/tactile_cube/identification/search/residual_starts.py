@@ -18,7 +18,7 @@ from tactile_cube.measurement.replay.model import Model
 
 Array = NDArray[np.float64]
 HARMONIC = "harmonic"  # parameter [1/rad] by which an effect says that it repeats with the position
-LOWEST, HIGHEST = 1.25, 160.0  # [1/rad] of a finger: from a wave as long as its range of motion on
+LOWEST, HIGHEST = 1.25, 160.0  # [1/rad] of a finger: waves of 5 rad to 39 mrad
 RESOLUTION = 0.8  # grid step times the range of motion: finer than half a peak
 NARROWEST = 0.05  # [rad] range that is told apart by harmonics at all
 PEAKS = 2
