@@ -85,18 +85,17 @@ def identify_effects(
     search, floor = divided(recording, classes, seed, say)
     held_out, base = search.held_out, search.base
     stages = {"nominal": search.start_held_out, "refitted": base.judgement.model}
-    current, judgement = base.fit, base.judgement
+    current = base.fit
     for effect, joint, parameters in wanted:
         added = with_effect(search, search.frozen(current), effect, joint, parameters).model
         search.problem.linearise_starts(added)
         current = _no_worse(search, current, added)
         label = current.model.terms[-1].label
-        judgement = search.judged(current.model)
-        stages[f"+ {label}"] = judgement.model
+        stages[f"+ {label}"] = search.judged(current.model).model
         say(f"fitted {label}")
     fitted = final_model(search, Problem(search.shooting, search.all_windows), current.model)
-    last = list(stages)[-1]
-    stages[last] = fitted.model.with_offsets(stages[last].offsets)
+    judgement = search.judged(fitted.model)
+    stages[list(stages)[-1]] = judgement.model
     say("simulating the held-out trials")
     summaries = {k: free_run_error(held_out, free_run(held_out, m, step)) for k, m in stages.items()}
     return Identification(fitted, summaries, floor, judgement, [trial.name for trial in held_out.trials])

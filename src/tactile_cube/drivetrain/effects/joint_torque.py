@@ -203,7 +203,7 @@ class JointStop(Effect):
 
     forms = ({"upper": 1.0, "stiffness": 5.0}, {"lower": -1.0, "stiffness": 5.0})
 
-    details = ("exponent",)
+    details = ("exponent", "damping")
 
     @classmethod
     def unseen_at(cls, scales: Scales) -> str | None:
