@@ -62,6 +62,16 @@ def test_what_other_runs_of_the_command_show_too_is_no_push(plain: Recording) ->
     assert found(pushed(plain, 0, 1, 2)) == []
 
 
+def test_a_push_is_found_beside_a_model_that_fails_in_all_runs(plain: Recording) -> None:
+    wave = 0.02 * np.sin(2.0 * np.pi * 1.3 * plain.trials[0].time)
+    pushed_once = pushed(plain, 1)
+    wrong = [replace(one, position=one.position + wave[:, None]) for one in pushed_once.trials]
+    (one,) = found(pushed_once.with_trials(wrong))
+    assert (one.trial, one.joint) == ("run_1", "b")
+    assert START - 1.0 < one.start < START < END < one.end < END + 1.0
+    assert one.error < 5.0 * one.usual
+
+
 def test_two_pushes_at_the_same_time_are_found_where_a_third_run_shows_none(plain: Recording) -> None:
     assert [one.trial for one in found(pushed(plain, 0, 2))] == ["run_0", "run_2"]
 

@@ -22,8 +22,10 @@ from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model, nominal_model
 
 Array = NDArray[np.float64]
-STANDS_OUT = 5.0  # times a joint's usual error: less hardly moves a fit, and a joint that sticks does it by chance
+STANDS_OUT = 5.0  # times what is usual: less hardly moves a fit, and a joint that sticks does it by chance
 USUAL = 0.9  # share of a joint's segments with the usual error: what disturbs more belongs to the machine
+SCATTER = 0.95  # share of a joint's segments whose error exceeds that of another run by no more than is usual
+ALIKE = 0.5  # share of an error that another run has too where a law makes it
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,8 @@ class Disturbance:
 def disturbances(search: Search, recording: Recording, model: Model) -> list[Disturbance]:
     """Return the intervals in which the model fails although it holds elsewhere and in repeats of the command.
 
+    Where a command was repeated, a run is compared with the others: what a law misses, it misses in all of them.
+
     Args:
         search: cuts trials into segments and simulates them.
         recording: every trial, of both parts and those that test.
@@ -63,11 +67,17 @@ def disturbances(search: Search, recording: Recording, model: Model) -> list[Dis
     errors = segment_errors(problem, judge(problem, recording, found).residual)
     usual = np.maximum(np.nanquantile(errors, USUAL, axis=0), 1.0)
     by_trial, rows = _by_trial(problem, errors, len(recording.trials)), problem.windows.segment
+    repeats = [repeats_of(recording.trials, index) for index in range(len(recording.trials))]
+    beyond = [
+        _beyond(own, [(by_trial[k], lag) for k, lag in others], rows)
+        for own, others in zip(by_trial, repeats, strict=True)
+    ]
+    more = np.nan_to_num(np.maximum(np.concatenate(beyond), 0.0))
+    scatter = np.maximum(np.quantile(more, SCATTER, axis=0), 1.0)
     found_in = []
-    for index, (trial, own) in enumerate(zip(recording.trials, by_trial, strict=True)):
-        failing = np.flatnonzero((own > STANDS_OUT * usual).any(axis=1))
-        others = [(by_trial[k], lag) for k, lag in repeats_of(recording.trials, index)] if len(failing) else []
-        failing = np.array([k for k in failing if not _shared(own, int(k), others, rows)], dtype=int)
+    for trial, own, excess, others in zip(recording.trials, by_trial, beyond, repeats, strict=True):
+        unlike = excess > np.maximum(np.maximum(STANDS_OUT * scatter, usual), (1.0 - ALIKE) * own)
+        failing = np.flatnonzero(np.where(np.isnan(excess), own > STANDS_OUT * usual, unlike).any(axis=1))
         for first, last in _intervals(failing):
             mean = np.sqrt(np.nanmean(own[first : last + 1] ** 2, axis=0))
             joint = int(np.nanargmax(mean / usual))
@@ -105,13 +115,19 @@ def _by_trial(problem: Problem, errors: Array, trials: int) -> list[Array]:
     return found
 
 
-def _shared(own: Array, place: int, others: Sequence[tuple[Array, int]], rows: int) -> bool:
-    """Return whether all other runs of the command fail at about that time too, at the joint with most error."""
-    joint = int(np.nanargmax(own[place]))
-    there = [(errors[:, joint], place - round(lag / rows)) for errors, lag in others]
-    near = [errors[max(first - 1, 0) : first + 2] for errors, first in there]
-    measured = [errors for errors in near if np.isfinite(errors).any()]
-    return bool(measured) and all(np.any(STANDS_OUT * errors > own[place, joint]) for errors in measured)
+def _beyond(own: Array, others: Sequence[tuple[Array, int]], rows: int) -> Array:
+    """Return by how much errors (segments, n) exceed those of another run of the command at about that time.
+
+    That run is the one with the least; nan where no other run was measured.
+    """
+    least = np.full(own.shape, np.nan)
+    for errors, lag in others:
+        for place in range(len(own)):
+            first = place - round(lag / rows)
+            near = errors[max(first - 1, 0) : max(first + 2, 0)]
+            if len(near):
+                least[place] = np.fmin(least[place], np.fmax.reduce(near, axis=0))
+    return np.asarray(own - least)
 
 
 def _intervals(failing: NDArray[np.int64]) -> list[tuple[int, int]]:
