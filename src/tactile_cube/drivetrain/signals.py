@@ -32,4 +32,6 @@ LOOSE_TORQUE = 21  # torque that the motor would carry did no law of the positio
 SENSOR_VELOCITY = 22  # speed of what the position sensor reads: of the joint, or of a rotor behind a spring [rad/s]
 MOTOR_SHARE = 23  # part of FRICTION that acts on a rotor behind a spring and not on the link
 INERTIA = 24  # inertia of the joint, rotor included, while the others stand [kg m^2]
-ROWS = 25
+COMMAND_AFTER = 25
+"""What COMMAND will be at the end of the step [rad]; a command that jumps at its beginning is the mean there."""
+ROWS = 26

@@ -10,6 +10,7 @@ from tactile_cube.drivetrain.effects import (
     ACCELERATION,
     ANGLE,
     COMMAND,
+    COMMAND_AFTER,
     CONTROLLER_TORQUE,
     DEFLECTION,
     DIRECTION,
@@ -124,6 +125,8 @@ SUPPLY = {"stall": 0.4, "no_load": 10.0}
 AT_REST = {CONTROLLER_TORQUE: [0.25] * 3, LOAD: 0.3, COMMAND: 0.5, MOTOR_POSITION: 0.38, DEFLECTION: 0.02}
 AT_REST |= {VELOCITY: 0.0, FRICTION: 0.0, TORQUE: 0.25}
 MOVED = {COMMAND: [0.5, 9.0, 9.0], MOTOR_POSITION: [0.1, 0.3, 0.3]}
+LIMITED = [0.3, 0.4, 0.4, 0.35, -0.35]  # a rate limit follows by the end of a step, its mean is what acts in it
+MEANS = [0.3, 0.35, 0.4, 0.375, 0.0]
 JUMP = {CONTROLLER_TORQUE: 0.1, COMMAND: [0.3, 0.34, 0.34]}
 SLIDE = {FRICTION: 0.1, JOINT_TORQUE: 0.5}
 KEPT = exp(-0.2)  # of a bristle's bend, when 0.1 rad/s move it for 2 ms
@@ -149,7 +152,11 @@ ROWS_OF_LAWS = (
         ({"torque": 0.1}, {TORQUE: -0.05}, 0.0),
         law="torque_law",
     ),
-    *rows("rate_limit", ({"speed": 10.0}, {COMMAND: [0.3, 0.4, 0.4, 0.35, -0.35]}, [0.3, 0.32, 0.34, 0.35, 0.33])),
+    *rows(
+        "rate_limit",
+        ({"speed": 10.0}, {COMMAND_AFTER: LIMITED, COMMAND: MEANS}, [0.3, 0.31, 0.33, 0.345, 0.34]),
+        ({"speed": 1e9}, {COMMAND_AFTER: LIMITED, COMMAND: [0.3, 0.31, 0.4, 0.36, 0.2]}, [0.3, 0.31, 0.4, 0.36, 0.2]),
+    ),
     *rows(
         "command_delay",
         ({"delay": 0.005}, {COMMAND: [1.0, 2.0, 4.0, 8.0, 16.0]}, [1.0, 1.0, 1.0, 1.5, 3.0]),

@@ -194,7 +194,7 @@ CLOSED_FORMS = (
     ("asymmetric_friction", ONE_SIDED, {"drive": DRY, "v": 4.0}, VELOCITY, 4.0 - 0.04 * 1.3 * PER_INERTIA, 1e-9),
     ("asymmetric_friction", ONE_SIDED, {"drive": DRY, "v": -3.0}, VELOCITY, -3.0 + 0.02 * 0.7 * PER_INERTIA, 1e-9),
     ("friction_drift", WARMING, {"drive": DRY, "v": 3.0}, VELOCITY, 3.0 - IMPULSE / INERTIA, 3e-4),
-    ("rate_limit", {"speed": 2.0}, {"command": STEP}, COMMAND, np.maximum(-2.0 * T, -0.3), 1e-9),
+    ("rate_limit", {"speed": 2.0}, {"command": STEP}, COMMAND, np.clip(-2.0 * (T - 0.5 * DT), -0.3, 0.0), 1e-9),
     zone("error", 0.2 - 0.02 - 0.1),
     ("command_dead_zone", {"gate": 0.5}, {"drive": SERVO | {"kd": 0.0}, "command": 0.2, "v": 0.1}, VELOCITY, 0.1, 1e-3),
     zone("torque", 0.2 - 0.02 / KP - 0.1),

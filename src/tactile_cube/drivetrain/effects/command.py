@@ -5,6 +5,7 @@ from math import ceil, exp
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Scales, Stage
 from tactile_cube.drivetrain.signals import (
     COMMAND,
+    COMMAND_AFTER,
     CONTROLLER_TORQUE,
     DAMPING,
     DEFLECTION,
@@ -108,16 +109,22 @@ class RateLimit(Effect):
         fastest = min(scales.speed, scales.command_speed)
         return [{"speed": share * fastest} for share in RATES]
 
-    state_size = 2  # limited command, first-call flag
+    state_size = 3  # limited command, first-call flag, command wanted before
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
+        """Return the mean of the limited command over a step [rad]."""
+        wanted = x[COMMAND_AFTER, j]
         if s[1] == 0.0:
-            s[0] = x[COMMAND, j]
+            s[0] = s[2] = wanted
             s[1] = 1.0
-        step = p[0] * dt
-        s[0] = s[0] + min(max(x[COMMAND, j] - s[0], -step), step) if abs(x[COMMAND, j] - s[0]) > step else x[COMMAND, j]
-        return s[0]
+        limited, before, step = s[0], s[2], p[0] * dt
+        s[2] = wanted
+        if abs(wanted - limited) <= step:
+            s[0] = wanted
+            return x[COMMAND, j] if limited == before else 0.5 * (limited + wanted)
+        s[0] = limited + min(max(wanted - limited, -step), step)
+        return 0.5 * (limited + s[0])
 
 
 LONGEST = 0.1  # longest delay that the state can hold [s]

@@ -26,6 +26,7 @@ def shape_target(x: Array, c: int, dt: float, memory: Array) -> None:
         memory[plant.LIMITED + a] = limited
         kp, kd, limit = memory[plant.KP + a], memory[plant.KD + a], memory[plant.COMMAND_TORQUE_LIMIT + a]
         x[sig.COMMAND, j] = limit_torque(limited, x[sig.MOTOR_POSITION, j], x[sig.VELOCITY, j], kp, kd, limit)
+        x[sig.COMMAND_AFTER, j] = x[sig.COMMAND, j]
 
 
 @compiled

@@ -75,8 +75,17 @@ def take_equations(c: int, x: Array, q: Array, here: Array, memory: Array) -> No
 
 
 @compiled
+def take_command(c: int, x: Array, command: Array) -> None:
+    """Take the command (C n,) of a step, or (2 C n,) with what it is at the step's end."""
+    for j in range(n):
+        a = c * n + j
+        x[sig.COMMAND, j] = command[a]
+        x[sig.COMMAND_AFTER, j] = command[C * n + a] if len(command) > C * n else command[a]
+
+
+@compiled
 def free_step(command: Array, memory: Array, path: Array, row: int) -> None:
-    """Advance the mechanism by a step without contacts: semi-implicit Euler, as Bullet.
+    """Advance the mechanism by a step without contacts, see `take_command`: semi-implicit Euler, as Bullet.
 
     A model that `follows` takes the equations of motion from step `row` of a path (steps PATH_WIDTH,), which another
     one has noted that went along it before; a path of less than a step is none.
@@ -99,7 +108,7 @@ def free_step(command: Array, memory: Array, path: Array, row: int) -> None:
             x[sig.CONTACT, j] = memory[plant.EXTERNAL_TORQUE + c * n + j]
             x[sig.LOAD, j] = memory[plant.JOINT_BIAS + j] - x[sig.CONTACT, j]
             x[sig.TIME, j] = memory[plant.STEP] * dt
-            x[sig.COMMAND, j] = command[c * n + j]
+        take_command(c, x, command)
         plant.effects_command(x, c, dt, memory)
         drive(x, c, dt, memory)
         next_speeds(x, c, dt, memory)
@@ -122,8 +131,7 @@ def advance_commands(command: Array, memory: Array) -> None:
     """Take a step before the start: only effects on the command have a state."""
     for c in range(C):
         x = signals_of(c, memory)
-        for j in range(n):
-            x[sig.COMMAND, j] = command[c * n + j]
+        take_command(c, x, command)
         plant.effects_command(x, c, memory[plant.DT], memory)
 
 

@@ -238,7 +238,8 @@ class Simulator:
         pool: ThreadPoolExecutor | None,
     ) -> None:
         count, fine = len(windows), windows.substeps
-        commands = np.ascontiguousarray(windows.commands[:, windows.history * fine - past :])
+        both = np.concatenate([windows.commands, np.repeat(windows.held, fine, axis=1)], axis=2)
+        commands = np.ascontiguousarray(both[:, windows.history * fine - past :])
         lengths, segment = np.full(count, signals.shape[1]), windows.segment * fine
         starts = (windows.position, windows.speed, windows.initial_state, np.tile(correction, (count, 1)))
         given = (commands, np.arange(count), lengths, past, 1, segment, *starts, memory, paths, rows)

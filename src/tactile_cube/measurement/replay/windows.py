@@ -39,6 +39,7 @@ class Windows:
 
     Attributes:
         commands: (S, (H + K segment) substeps, n) what each step takes, after `history` rows of the past [rad].
+        held: (S, H + K segment, n) what each row's steps end with [rad].
         measured: (S, K segment, M) measured positions [rad].
         jump: (S, K segment, n) command of the step at each reading less the one that the log feels: half the change of
             the command, or of what the torque reaches [rad].
@@ -68,6 +69,7 @@ class Windows:
     """
 
     commands: Array
+    held: Array
     measured: Array
     jump: Array
     weight: Array
@@ -112,6 +114,7 @@ class Windows:
         return replace(
             self,
             commands=self.commands[:, : (self.history + self.segment) * self.substeps],
+            held=self.held[:, : self.history + self.segment],
             **{key: getattr(self, key)[:, rows] for key in ("measured", "jump", "weight")},
             **{key: getattr(self, key)[:, :1] for key in ("position", "speed", "acceleration", "start_noise")},
         )
@@ -121,7 +124,7 @@ class Windows:
         return values.reshape(len(self) * self.segments, -1)
 
 
-ROWS = tuple(field.name for field in fields(Windows))[:18]  # arrays with one row a window
+ROWS = tuple(field.name for field in fields(Windows))[:19]  # arrays with one row a window
 
 
 def cut(
@@ -219,6 +222,7 @@ def _pieces(recording: Recording, trial: Trial, index: int, sizes: Cut) -> Itera
     noise = every[: trial.position.shape[1]]
     fine, jump = _as_simulated(recording, trial, substeps)
     command, after = _around(_as_positions(recording, trial), recording.read)
+    held = np.stack([command, after], axis=1)
     errors = trial.step * (after[:-1] - 0.5 * (trial.position[:-1] + trial.position[1:]))
     errors = np.stack([errors, np.diff(trial.position, axis=0)], axis=1)
     drive = _drive(recording, trial)
@@ -238,6 +242,7 @@ def _pieces(recording: Recording, trial: Trial, index: int, sizes: Cut) -> Itera
             trial_start = np.stack([position[0], fine[0, 0], speed[0]])
         yield {
             "commands": _rows(fine, first - history, first + rows).reshape((history + rows) * substeps, -1),
+            "held": _rows(held, first - history, first + rows)[:, 1],
             "measured": measured[usable],
             "jump": np.where((span < len(trial.time))[:, None], jump[usable], 0.0),
             "weight": present[:, None] * seen / every,
