@@ -262,7 +262,7 @@ class Backlash(Effect):
         Parameter("crossing", unit="s", neutral=0.0, low=0.0, high=0.2, typical=0.0, source="oil; ms", scale=0.005),
     )
 
-    forms = ({"play": 0.01}, {"gap": 0.01}, {"smooth": 0.01, "softness": 0.01})
+    forms = ({"play": 0.01}, {"gap": 0.01}, {"gap": 0.01, "crossing": 0.02}, {"smooth": 0.01, "softness": 0.01})
     details = ("crossing",)
 
     @classmethod
