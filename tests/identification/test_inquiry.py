@@ -4,10 +4,17 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.identification.criteria import STANDARD
-from tactile_cube.identification.diagnosis import Answer, Inquiry, beside_disturbances, without_needless
+from tactile_cube.identification.diagnosis import (
+    Answer,
+    Inquiry,
+    beside_disturbances,
+    in_simpler_laws,
+    without_needless,
+)
 from tactile_cube.identification.search.explanation import Proposal, named_by
 from tactile_cube.identification.search.findings import Findings
 from tactile_cube.identification.verdict import Simulations, Verdict
@@ -54,3 +61,25 @@ def test_an_effect_that_may_be_nothing_is_no_part_of_a_claim(tmp_path: Path) -> 
 
     assert named_by(both.effects) == {("coulomb_friction", "a"), ("torque_bias", "a")}
     assert claimed(both) == claimed(alone) == {("coulomb_friction", "a")}
+
+
+@pytest.mark.parametrize(
+    ("hidden", "values"),
+    [("coulomb_friction", {"friction": 0.16}), ("presliding_friction", {"breakaway": 0.02, "excess": 0.16})],
+)
+def test_the_simpler_law_is_named_where_an_interval_reaches_it(
+    tmp_path: Path, hidden: str, values: dict[str, float]
+) -> None:
+    dry, bristles = find_effect("coulomb_friction"), find_effect("presliding_friction")
+    recording = simulated(tmp_path, Size(), find_effect(hidden), values, repeats=3)
+    search = Inquiry(recording, (dry, bristles), 0, lambda line: None, None, STANDARD).search
+    (richer, *_) = (one for one in search.candidates if set(one.form) == {"breakaway", "excess"})
+    fit = search.refitted(richer.added_to(search.base.fit.model)[0])
+    verdict = Verdict("missing_effect", search.explained(Proposal((richer,), fit), 1))
+    answer = Answer(
+        search,
+        Findings(search.base, search.base.judgement, (verdict.chosen,)),
+        Simulations(search, search.base, noise_floor(recording)),
+        verdict,
+    )
+    assert named_by(in_simpler_laws(answer, verdict).chosen.effects) == {(hidden, "a")}

@@ -20,7 +20,7 @@ from tactile_cube.identification.next_experiment import Experiment, next_experim
 from tactile_cube.identification.search.candidates import first_term
 from tactile_cube.identification.search.evidence import HeldOut, gain, judge, worse
 from tactile_cube.identification.search.explanation import Explanation, Proposal, named
-from tactile_cube.identification.search.findings import CommonOffset, Findings, common_offsets, find
+from tactile_cube.identification.search.findings import CommonOffset, Findings, common_offsets, find, reached
 from tactile_cube.identification.search.proposals import without
 from tactile_cube.identification.search.search import BestSoFar, Search
 from tactile_cube.identification.standard_model import StandardModel, fit_standard_model
@@ -240,7 +240,8 @@ def diagnose_recording(
     _, held_out, tested = inquiry.parts
     test = held_out if tested is None else tested
     untouched = HeldOut(search.shooting, test, search.noise, nominal_model(test, known).offsets)
-    verdict = no_worse(without_needless(answer), standard, search, simulations, untouched)
+    verdict = in_simpler_laws(answer, without_needless(answer))
+    verdict = no_worse(verdict, standard, search, simulations, untouched)
 
     def tested_with(chosen: Explanation) -> tuple[dict[str, ErrorSummary], dict[str, float]]:
         models = {"refitted": findings.base.fit.model, "with_effects": simulations.final(chosen).model}
@@ -298,6 +299,33 @@ def without_needless(answer: Answer) -> Verdict:
     less = search.explained(without(search, Proposal(chosen.effects, chosen.fit), *idle), findings.looked)
     if worse(less.judgement, chosen.judgement, search.criteria):
         return verdict
+    return instead_of(verdict, less)
+
+
+def in_simpler_laws(answer: Answer, verdict: Verdict) -> Verdict:
+    """Return the verdict with each effect as the simpler law that it becomes at a value within its final interval.
+
+    It stays as it is if the simpler law predicts the held-out trials worse.
+    """
+    search, findings, simulations, _ = answer
+    for place in reversed(range(len(verdict.chosen.effects))):
+        chosen = verdict.chosen
+        final, law = simulations.final(chosen), chosen.effects[place]
+        names = reached(law.effect, final.fit, final.half_width, first_term(final.model, chosen.effects, place))
+        simpler = [one for one in search.candidates if one.effect.name in names and one.joints == law.joints]
+        if not simpler:
+            continue
+        left = without(search, Proposal(chosen.effects, chosen.fit), place)
+        parent = search.frozen(left.fit)
+        best, begun = min((search.refit(parent, one) for one in simpler), key=lambda one: one[1].cost)
+        tried = Proposal((*left.effects, best), search.refitted(begun.model))
+        if not worse((less := search.explained(tried, findings.looked)).judgement, chosen.judgement, search.criteria):
+            verdict = instead_of(verdict, less)
+    return verdict
+
+
+def instead_of(verdict: Verdict, less: Explanation) -> Verdict:
+    """Return the verdict with a simpler explanation, which is no rival of itself."""
     rivals = tuple(one for one in verdict.rivals if named(one) != named(less))
     return Verdict("missing_effect" if verdict.kind == "ambiguous" and not rivals else verdict.kind, less, rivals)
 

@@ -11,6 +11,7 @@ from scipy.stats import t as student_t
 
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.identification.criteria import STANDARD, Criteria
+from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.fitting.resolution import NORMAL_95, standard_errors
 from tactile_cube.identification.search.candidates import Candidate, Score, Sizes, first_term
 from tactile_cube.identification.search.evidence import Judgement, worse
@@ -271,18 +272,23 @@ def instead(looks: Looks, replaced: Sequence[Candidate]) -> list[Tried]:
 
 def simpler_laws(search: Search, chosen: Explanation, place: int) -> set[str]:
     """Return the special cases of an effect that its intervals include; those of a table always count."""
-    fitted = search.frozen(chosen.fit)
-    first = first_term(fitted.model, chosen.effects, place)
-    width = NORMAL_95 * standard_errors(search.problem, fitted)
+    fitted, effect = search.frozen(chosen.fit), chosen.effects[place].effect
+    width = NORMAL_95 * standard_errors(search.problem, fitted) * np.array([u.scale for u in fitted.unknowns])
+    tables = {name for name, values in effect.contains.items() if not values}
+    return tables | reached(effect, fitted, width, first_term(fitted.model, chosen.effects, place))
+
+
+def reached(effect: type[Effect], fitted: Fit, half_width: Array, term: int) -> set[str]:
+    """Return the special cases of an effect, a fit's `term`, whose values lie within its intervals (P,)."""
     reach = [
-        (u.key, u.of(fitted.model), w * u.scale, u.high)
-        for u, w in zip(fitted.unknowns, width, strict=True)
-        if u.kind == "effect" and u.place == first
+        (u.key, u.of(fitted.model), half, u.high)
+        for u, half in zip(fitted.unknowns, half_width, strict=True)
+        if u.kind == "effect" and u.place == term
     ]
     return {
         name
-        for name, values in chosen.effects[place].effect.contains.items()
-        if not values or any(k in values and abs(min(values[k], high) - at) <= half for k, at, half, high in reach)
+        for name, values in effect.contains.items()
+        if any(k in values and abs(min(values[k], high) - at) <= half for k, at, half, high in reach)
     }
 
 
