@@ -181,7 +181,8 @@ def in_time(
 def _fitted(recording: Recording, effects: Sequence[type[Effect]], known: ModelFile | None) -> tuple[float, float]:
     """Return the base model's error [sensor noise], and when the joint read last is read [rows after its stamp]."""
     noise = noise_with_links(recording)
-    base = Search(recording, recording, noise, effects, lambda line: None, known, segments=SEGMENTS).base
+    search = Search(recording, recording, noise, effects, lambda line: None, known, segments=SEGMENTS)
+    base = search.fitted_base()
     return base.error, float(base.fit.model.constants["reading_delay"].max() / recording.step)
 
 

@@ -113,16 +113,17 @@ class Search:
 
         Where it fails, `problem` takes the windows in which it fails most: rare failures may be in none of the others.
         """
-        found = self._base()
+        found = self.fitted_base()
         if found.largest_error <= self.criteria.adequate:
             return found
         every, model = Problem(self.shooting, self.all_windows), found.fit.model
         every.linearise_starts(model)
         costs = every.cost(every.residual(every.prediction(model)))
         self.problem = Problem(self.shooting, failing(self.all_windows, costs, self.segments // FITTED))
-        return self._base()
+        return self.fitted_base()
 
-    def _base(self) -> Explanation:
+    def fitted_base(self) -> Explanation:
+        """Refit the constants on the windows of `problem`; keep what is stated if that does better."""
         self.problem.linearise_starts(self.start)
         first = fit(self.problem, self.start, self.unknowns(self.start), iterations=4)
         self.problem.linearise_starts(first.model)
