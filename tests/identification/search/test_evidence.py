@@ -87,6 +87,7 @@ def test_trials_in_which_nothing_moves_do_not_hide_what_the_others_show() -> Non
     after = replace(before, costs=before.costs - difference, trial=trial)
     assert p_value(before, after) < 1e-4
     assert p_value(before, replace(after, costs=before.costs - 0.002 * difference)) > 1e-3, "slight everywhere"
+    assert len(in_blocks(10.0 * difference, after)) == len(moving), "a hundredth of the largest is noise, however large"
 
 
 def test_segments_at_rest_in_which_a_model_rests_too_are_no_infinite_proof() -> None:
