@@ -19,7 +19,7 @@ from tactile_cube.identification.fitting.resolution import Fitted, needless, res
 from tactile_cube.identification.next_experiment import Experiment, next_experiment
 from tactile_cube.identification.search.candidates import first_term
 from tactile_cube.identification.search.evidence import HeldOut, gain, judge, worse
-from tactile_cube.identification.search.explanation import Explanation, Proposal, named
+from tactile_cube.identification.search.explanation import Explanation, Proposal, named, named_by
 from tactile_cube.identification.search.findings import CommonOffset, Findings, common_offsets, find, reached
 from tactile_cube.identification.search.proposals import without
 from tactile_cube.identification.search.search import BestSoFar, Search
@@ -312,7 +312,12 @@ def in_simpler_laws(answer: Answer, verdict: Verdict) -> Verdict:
         chosen = verdict.chosen
         final, law = simulations.final(chosen), chosen.effects[place]
         names = reached(law.effect, final.fit, final.half_width, first_term(final.model, chosen.effects, place))
-        simpler = [one for one in search.candidates if one.effect.name in names and one.joints == law.joints]
+        beside = named_by((*chosen.effects[:place], *chosen.effects[place + 1 :]))
+        simpler = [
+            one
+            for one in search.new(search.candidates)
+            if one.effect.name in names and one.joints == law.joints and not named_by((one,)) & beside
+        ]
         if not simpler:
             continue
         left = without(search, Proposal(chosen.effects, chosen.fit), place)
