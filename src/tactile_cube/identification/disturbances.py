@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 STANDS_OUT = 5.0  # times what is usual: less hardly moves a fit, and a joint that sticks does it by chance
 USUAL = 0.9  # share of a joint's segments with the usual error: what disturbs more belongs to the machine
 SCATTER = 0.95  # share of a joint's segments whose error exceeds that of another run by no more than is usual
-ALIKE = 0.5  # share of an error that another run has too where a law makes it
+UNLIKE = 0.5  # share of an error that another run lacks: less of it may be a law's, in runs that start otherwise
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ def disturbances(search: Search, recording: Recording, model: Model) -> list[Dis
     scatter = np.maximum(np.quantile(more, SCATTER, axis=0), 1.0)
     found_in = []
     for trial, own, excess, others in zip(recording.trials, by_trial, beyond, repeats, strict=True):
-        unlike = excess > np.maximum(np.maximum(STANDS_OUT * scatter, usual), (1.0 - ALIKE) * own)
+        unlike = excess > np.maximum(np.maximum(STANDS_OUT * scatter, usual), UNLIKE * own)
         failing = np.flatnonzero(np.where(np.isnan(excess), own > STANDS_OUT * usual, unlike).any(axis=1))
         for first, last in _intervals(failing):
             mean = np.sqrt(np.nanmean(own[first : last + 1] ** 2, axis=0))

@@ -22,7 +22,7 @@ from tactile_cube.measurement.replay.model import Model
 Array = NDArray[np.float64]
 FEWEST_BLOCKS = 5  # for an estimate of their scatter
 SLIGHT = 1.0  # [sensor variance] what a number that follows noise alone gains in a segment, in the mean
-TELLING = 0.01  # of the largest difference: what is less says nothing of a law, only of noise
+INFORMATIVE = 0.01  # of the largest difference: what is less says nothing of a law, only of noise
 FEWEST_PAIRS = 10  # of segments so far apart, that an autocorrelation needs
 
 
@@ -164,9 +164,10 @@ def in_blocks(difference: Array, judged: Judgement) -> Array:
     Ties are left out if enough segments differ: segments at rest would look like a correlation as long as a trial.
     """
     counted = judged.samples > 0
-    telling = counted & (np.abs(difference) >= max(SLIGHT, TELLING * float(np.abs(difference).max(initial=0.0))))
-    if np.count_nonzero(telling) >= FEWEST_PAIRS:
-        counted = telling
+    least = max(SLIGHT, INFORMATIVE * float(np.abs(difference).max(initial=0.0)))
+    informative = counted & (np.abs(difference) >= least)
+    if np.count_nonzero(informative) >= FEWEST_PAIRS:
+        counted = informative
     difference, trial = difference[counted], judged.trial[counted]
     length = correlation_length(difference, trial)
     if length == 1:
