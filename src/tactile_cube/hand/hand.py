@@ -83,6 +83,8 @@ class Hand:
         rotation: Hand frame in the world (3, 3).
         start_angles: Fingers 1 mm off the nominal object (joints,) [rad].
         palm: Shapes of what no joint moves, for pictures.
+        palm_contact: Whether they touch the object too; a palm never touches fingers.
+        start_fixed: Whether `start_angles` are for every object, not for the nominal one alone.
         drive: Constants of an episode that belong to the drives, by their names in `EpisodeConstants`; what is left out
             is as in the DLR-Hand II.
         file: Name of the URDF's file that it was read from.
@@ -97,6 +99,8 @@ class Hand:
     position: Array
     rotation: Array
     palm: tuple[CollisionShape, ...]
+    palm_contact: bool = False
+    start_fixed: bool = False
     action_lower: Array = field(default_factory=lambda: np.zeros(0))
     action_upper: Array = field(default_factory=lambda: np.zeros(0))
     start_angles: Array = field(default_factory=lambda: np.zeros(0))
@@ -213,6 +217,11 @@ class Hand:
             base = origin_element(finger.position, finger.rotation)
             parts += self._finger_parts(finger, finger.prefix, "palm", base)
         return robot_element(self.name, parts)
+
+    def palm_urdf(self) -> str:
+        """Return the URDF of what no joint moves, rooted in the hand frame, with the shapes that the object touches."""
+        shapes = "".join(collision_element(shape) for shape in self.palm)
+        return robot_element("palm", [_BASE.replace("</link>", shapes + "</link>")])
 
     def finger_urdf(self, finger: int) -> str:
         """Return a finger's own URDF, rooted in the frame of its first joint; names are without its prefix."""

@@ -153,6 +153,7 @@ def hand_from_urdf(
     action: Mapping[str, Sequence[float]] | None = None,
     start: Sequence[float] | None = None,
     drive: Mapping[str, float | Sequence[float]] | None = None,
+    palm_contact: bool = False,
     sha256: str | None = None,
 ) -> Hand:
     """Describe a hand.
@@ -168,8 +169,9 @@ def hand_from_urdf(
         rotation: of the root link, as URDF's roll, pitch and yaw [rad].
         action: `lower` and `upper` of the desired angles that actions -1 and +1 mean, for the joints of one finger or
             of all [rad]; None: the URDF's limits.
-        start: joint angles in which episodes start [rad]; None: fingertips 1 mm off a cube of 8 cm.
+        start: joint angles in which episodes start [rad]; None: fingertips 1 mm off the object.
         drive: constants of the drives by their names in EpisodeConstants, e.g. kp [N m/rad].
+        palm_contact: whether the object touches what no joint moves, as on a hand that lies palm up.
         sha256: that the URDF's file has to have; None: any.
 
     Raises:
@@ -204,6 +206,8 @@ def hand_from_urdf(
         position=_vector("position", position),
         rotation=Rotation.from_euler("xyz", _vector("rotation", rotation)).as_matrix(),
         palm=tuple(read_shapes(ElementTree.fromstring(text), moving, -1, np.eye(3))),
+        palm_contact=bool(palm_contact),
+        start_fixed=start is not None,
         drive={key: np.asarray(value) if np.ndim(value) else float(value) for key, value in (drive or {}).items()},  # type: ignore[arg-type]
         file=file.name,
         sha256=digest,

@@ -48,7 +48,7 @@ class StartStates:
         """Return the start poses of `hand` with the object of `constants`; None: the nominal cube."""
         known = constants or EpisodeConstants()
         nominal = known.object_shape == "box" and np.array_equal(known.cube_size, EpisodeConstants().cube_size)
-        if self.poses == 1 and nominal:
+        if self.poses == 1 and (nominal or hand.start_fixed):
             return StartPoses(hand, np.zeros(1), np.asarray(hand.start_angles, dtype=np.float64)[None])
         yaws = np.linspace(-self.yaw_range, self.yaw_range, self.poses) if self.poses > 1 else np.zeros(1)
         size, shape = np.asarray(known.cube_size), known.object_shape

@@ -31,6 +31,7 @@ TILTED = 0.05
 _ALL_GROUPS = 0xFFFF
 _FIRST_FINGER_GROUP = 0x10
 """Collision group of the first finger, one bit for each; Bullet gives bits below to bodies of its own accord."""
+_CUBE_GROUP, _PALM_GROUP = 0x1, 0x8  # Bullet's own of moving bodies; one that nothing else here has
 _URDF_FLAGS = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_IGNORE_VISUAL_SHAPES
 _NO_DAMPING = {"linearDamping": 0.0, "angularDamping": 0.0, "jointDamping": 0.0}
 
@@ -84,6 +85,7 @@ class BulletEngine:
         fingers: Body ids of the fingers.
         cube: Body id of the cube.
         table: Body id of the table, -1 without one.
+        palm: Body id of the palm, -1 where nothing touches it.
     """
 
     def __init__(self, hand: Hand, options: SimulationOptions, drive: HandDrive) -> None:
@@ -102,6 +104,7 @@ class BulletEngine:
         self.fingers = [
             load_chain(self.client, urdf, *base) for urdf, base in zip(drive.finger_urdfs(), bases, strict=True)
         ]
+        self.palm = load_chain(self.client, hand.palm_urdf(), hand.position, hand.rotation) if hand.palm_contact else -1
         self._inertias = [
             [pybullet.getDynamicsInfo(body, link, **self._here)[2] for link in self._links] for body in self.fingers
         ]
@@ -172,7 +175,8 @@ class BulletEngine:
         return [row[8] for row in pybullet.getContactPoints(**self._here)]
 
     def contacts(self) -> list[Contact]:
-        names = {(body, -1): (name, "") for body, name in ((self.cube, "cube"), (self.table, "table"))}
+        fixed = ((self.cube, "cube"), (self.table, "table"), (self.palm, "palm"))
+        names = {(body, -1): (name, "") for body, name in fixed}
         for body, finger in zip(self.fingers, self._hand.fingers, strict=True):
             names |= {(body, k): (finger.name, link) for k, link in enumerate(finger.links)}
         found = []
@@ -278,16 +282,20 @@ class BulletEngine:
                     "localInertiaDiagonal": spinning,
                 }
                 pybullet.changeDynamics(body, link, **numbers, **self._here)
+        if self.palm >= 0:
+            pybullet.changeDynamics(self.palm, -1, lateralFriction=constants.link_friction, **self._here)
 
     def _forget_contacts(self) -> None:
-        """Register every finger anew with the broadphase; cube and table are new themselves.
+        """Register palm and fingers anew with the broadphase; cube and table are new themselves.
 
         That drops cached contacts and their impulses, so an episode depends on nothing that happened before it.
-        A finger meets everything but itself.
+        A finger meets everything but itself and the palm, the palm the cube alone.
         """
+        if self.palm >= 0:
+            pybullet.setCollisionFilterGroupMask(self.palm, -1, _PALM_GROUP, _CUBE_GROUP, **self._here)
         for k, body in enumerate(self.fingers):
             group = _FIRST_FINGER_GROUP << k
-            mask = _ALL_GROUPS & ~group
+            mask = _ALL_GROUPS & ~group & ~_PALM_GROUP  # PyBullet lets two meet where either mask has the other
             for link in (one for one in self._links if one not in self._bare[k]):
                 pybullet.setCollisionFilterGroupMask(body, link, group, mask, **self._here)
 

@@ -54,8 +54,10 @@ class HandSpec:
         self._cube = body, body.add_geom(name="cube", size=(0.04, 0.04, 0.04), **box)
         self._table = self.spec.worldbody.add_geom(name="table", size=TABLE_HALF_SIZE, **box)
         self._shapes |= {"cube": "cube", "table": "table"}
-        # everything meets everything but its own finger; the order is fixed
+        self._add_palm()
+        # everything meets everything but its own finger, the palm the cube alone; the order is fixed
         self._pairs = [(a, b) for a, b in combinations(self._shapes, 2) if a.split()[0] != b.split()[0]]
+        self._pairs = [(a, b) for a, b in self._pairs if not b.startswith("palm ") or a == "cube"]
         for a, b in self._pairs:
             self.spec.add_pair(name=f"{a} {b}", geomname1=a, geomname2=b, condim=CONDIM)
         self._mesh: Any = None
@@ -108,6 +110,14 @@ class HandSpec:
             )
             tendon.data[:5] = [0.0, 1.0, 0.0, 0.0, 0.0]
         return parts
+
+    def _add_palm(self) -> None:
+        """Add what no joint moves, where the object touches it."""
+        if self._hand.palm_contact:
+            palm = self.spec.worldbody.add_body(name="palm", pos=self._hand.position, quat=_wxyz(self._hand.rotation))
+            for number, shape in enumerate(self._hand.palm):
+                self._add_shape(palm, f"palm #{number}", shape)
+                self._shapes[f"palm #{number}"] = "link"
 
     def _add_shape(self, body: Any, name: str, shape: CollisionShape) -> None:
         """Add a link's collision geom; capsules and cylinders have half their length in MuJoCo."""
