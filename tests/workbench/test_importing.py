@@ -142,6 +142,18 @@ def test_a_recording_keeps_the_unit_of_its_log(tmp_path: Path) -> None:
     assert np.allclose(recording.trials[0].position[:, 0], np.radians(log["position"]), atol=1e-9)
 
 
+def test_added_logs_leave_every_signal_of_the_trials_before(tmp_path: Path) -> None:
+    columns = {name.replace(".", "_"): values for name, values in table().items()}
+    columns |= {"a_link_position": columns["a_position"] + 0.1, "b_feedforward": 0.01 + columns["b_position"]}
+    polars.DataFrame(columns).write_csv(tmp_path / "run.csv")
+    given = {**two_joints(tmp_path), "files": [str(tmp_path / "run.csv")]}
+    first, _ = import_logs(tmp_path / "first", given)
+    both, _ = import_logs(tmp_path / "both", given, first)
+    for trial in both.trials:
+        for signal in ("torque", "link_position", "feedforward"):
+            np.testing.assert_array_equal(getattr(trial, signal), getattr(first.trials[0], signal))
+
+
 def two_joints(folder: Path) -> dict[str, Any]:
     (folder / "rig.urdf").write_text(URDF)
     return {"urdf": str(folder / "rig.urdf"), "controller": GAINS}

@@ -220,7 +220,7 @@ def _added(before: Recording, made: RecordingTables, controller: Mapping[str, An
     for entry in described.trials:
         path = below(before.folder, entry.file, "trials.file")
         columns, _ = pick_columns(read_table(path), joints, path)
-        old.append(TrialTable(entry, columns.time, columns.command, columns.position, columns.torque, path))
+        old.append(TrialTable(entry, **vars(columns), origin=path))
     both = [*old, *made.tables]
     groups = kinds_of([Path(one.entry.file).stem for one in both], [one.command for one in both], before.step)
     kinds = {group: one.entry.kind for group, one in zip(groups, old, strict=False)}
