@@ -65,3 +65,12 @@ def test_the_robots_computer_needs_no_torch() -> None:
     )
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True)
     assert run.stdout.strip() == "False"
+
+
+def test_numpy_and_torch_give_the_same_action(tmp_path: Path) -> None:
+    actor, network = make_network(tmp_path)
+    observation = np.random.default_rng(1).normal(0.0, 0.5, (50, 120)).astype(np.float32)
+    with torch.no_grad():
+        expected = actor.deterministic(torch.from_numpy(observation)).numpy()
+    np.testing.assert_allclose(network(observation), expected, atol=2e-6)
+    assert network.info["time_constant"] == 0.5

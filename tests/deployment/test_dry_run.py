@@ -78,10 +78,11 @@ def test_a_signal_ends_all_runs_of_the_command_with_status_130(tmp_path: Path) -
     assert "run 1" not in said
 
 
+@pytest.mark.parametrize("value", [-1, math.nan, math.inf])
 @pytest.mark.parametrize("key", ["rate_limit", "seconds", "filter_time", "robot.rate", "stop.silence", "homing.speed"])
-def test_what_cannot_be_run_is_an_input_error_that_names_the_key(key: str) -> None:
-    with pytest.raises(tactile_cube.InputError, match=f"{key} is nan; give a finite number"):
-        tactile_cube.deploy(None, values={key: math.nan}, say=quiet)
+def test_what_cannot_be_run_is_an_input_error_that_names_the_key(key: str, value: float) -> None:
+    with pytest.raises(tactile_cube.InputError, match=f"{key} is {value}; give a finite number"):
+        tactile_cube.deploy(None, values={key: value}, say=quiet)
 
 
 def test_the_contract_states_the_rules_the_rate_and_the_homing_that_the_loop_takes() -> None:

@@ -1,5 +1,6 @@
 """The blind world against a second engine, its recordings, the rules of the judge, quick draws with real commands."""
 
+import importlib.util
 import json
 import sys
 from pathlib import Path
@@ -274,8 +275,10 @@ def test_the_judge_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.
     assert summary["right"] == 3
 
 
-def test_diagnosis_of_a_short_recording(tmp_path: Path) -> None:
-    generator.write(4, tmp_path, QUICK, ["command_delay"], "pendulum")
+@pytest.mark.skipif(importlib.util.find_spec("tactile_cube.diagnose") is None, reason="no diagnose command")
+@pytest.mark.parametrize(("seed", "names"), [(3, []), (4, ["command_delay"])])
+def test_diagnosis_of_a_short_recording(seed: int, names: list[str], tmp_path: Path) -> None:
+    generator.write(seed, tmp_path, QUICK, names, "pendulum")
     truth = json.loads((tmp_path / "truth.json").read_text())
     answer = judge.run_command("diagnose", tmp_path / "answer", f"recording={tmp_path / 'recording'}")
     assert answer is not None, (tmp_path / "answer" / "words.txt").read_text()
