@@ -129,13 +129,6 @@ def test_a_full_disk_is_said_with_the_file_and_a_way_out() -> None:
     assert "hydra.run.dir" in message
 
 
-def test_fail_prints_one_line_and_exits_with_2(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as info:
-        cli.fail("no such thing")
-    assert info.value.code == 2
-    assert capsys.readouterr().err == "error: no such thing\n"
-
-
 def test_a_value_that_another_choice_of_a_group_had_is_named() -> None:
     with pytest.raises(InputError) as info:
         env_config(experiment="alone", exploration="none", start="paper", values={"+start.file": "grasps.npz"})

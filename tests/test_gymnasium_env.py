@@ -46,7 +46,6 @@ def test_checker_of_gymnasium_is_content() -> None:
     ("imports", "name"),
     [
         ("import tactile_cube; import gymnasium", "tactile_cube/Rotation-v0"),
-        ("import gymnasium", "tactile_cube:tactile_cube/Rotation-v0"),
         ("import gymnasium", "tactile_cube.gymnasium_env:tactile_cube/Rotation-v0"),
     ],
 )

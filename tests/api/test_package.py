@@ -64,11 +64,3 @@ def test_a_word_that_is_no_command_ends_with_the_commands_there_are(tmp_path: Pa
     assert run.stderr.startswith("error: evalute: no such command; choose one of average, compare, deploy")
     assert run.stderr.endswith("; did you mean evaluate?\n")
     assert run.stderr.count("\n") == 1
-
-
-def test_every_command_can_be_imported() -> None:
-    # in a process of its own: a command's module takes the place of the package's function of that name
-    places = [name if name != "workbench" else "workbench.__main__" for name in commands()]
-    imports = "".join(f"from tactile_cube.{place} import main\nassert callable(main)\n" for place in places)
-    done = subprocess.run([sys.executable, "-c", imports], check=False, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr

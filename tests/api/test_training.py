@@ -86,20 +86,17 @@ def test_no_stage_is_taught_by_anybody(tmp_path: Path) -> None:
         assert "teacher" not in config.exploration
 
 
-def test_a_hand_that_the_package_has_no_grasps_of_gets_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(training, "GRASPS", 1)
-    first = training.stages_of(worded_job("train", ("+experiment=curriculum", "hand=three_finger"), tmp_path))[0]
-    assert first.config.start.file == str(tmp_path / "grasps.npz")
-    assert (tmp_path / "grasps.npz").is_file()
-
-
-def test_a_policy_of_a_hand_in_a_file_of_its_owners_is_judged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_hand_in_a_file_of_its_owners_gets_grasps_of_its_own_and_its_policy_is_judged(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(training, "GRASPS", 1)
     monkeypatch.chdir(tmp_path)
     Path("mine.urdf").write_bytes((DESCRIPTIONS / "three_finger.urdf").read_bytes())
     job = worded_job("train", ("+experiment=curriculum", "hand=three_finger", "hand.urdf=mine.urdf"), tmp_path)
     job.config.judgement = [*job.config.judgement, "protocol.episodes=1", "protocol.seconds=0.3"]
-    stage = training.stages_of(job)[-1]
+    stages = training.stages_of(job)
+    stage, grasps = stages[-1], tmp_path / "grasps.npz"
+    assert (stages[0].config.start.file, grasps.is_file()) == (str(grasps), True)
     actor = Actor(Sizes(120, 0, 12), (8,))
     told = PolicyInfo.describe(actor, time_constant=0.5, config=OmegaConf.to_container(stage.config, resolve=True))
     save_policy(tmp_path / "worlds" / "policy.safetensors", actor, told)

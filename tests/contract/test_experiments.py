@@ -3,6 +3,7 @@
 `python -m tests.contract.test_experiments` pins what they compose to now; read the difference before committing it.
 """
 
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ def flat(tree: Any, prefix: str = "") -> dict[str, Any]:
     return {name: leaf for key, value in pairs for name, leaf in flat(value, key).items()}
 
 
+@cache
 def settings(*overrides: str) -> dict[str, Any]:
     return flat(OmegaConf.to_container(composed("train", overrides)))
 

@@ -1,8 +1,6 @@
 """The command lines record and compare as a user types them."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -14,11 +12,6 @@ from tests.measurement.small_rig import URDF, table, write
 from tests.typed import typed
 
 
-def run(name: str, *arguments: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", f"tactile_cube.{name}", *arguments]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=240, check=False)
-
-
 def made_rig(folder: Path, *settings: str) -> tuple[str, ...]:
     """Words of `record` for a rig with two joints, whose URDF is written into the folder."""
     (folder / "two.urdf").write_text(URDF)
@@ -27,14 +20,14 @@ def made_rig(folder: Path, *settings: str) -> tuple[str, ...]:
 
 def test_record_then_compare(tmp_path: Path) -> None:
     words = made_rig(tmp_path, "source.duration=2", "source.step=0.002")
-    made = run("record", *words, folder=tmp_path)
+    made = typed("record", *words, folder=tmp_path)
     assert made.returncode == 0, made.stderr
     assert "8 trials" in made.stdout
     again = typed("record", *words, folder=tmp_path)
     assert again.returncode == 2
     assert "holds a recording already" in again.stderr
 
-    compared = run("compare", "recording=made", "band.simulations=3", "hydra.run.dir=run", folder=tmp_path)
+    compared = typed("compare", "recording=made", "band.simulations=3", "hydra.run.dir=run", folder=tmp_path)
     assert compared.returncode == 0, compared.stderr
     assert json.loads((tmp_path / "run" / "comparison.json").read_text())["error"]["overall"] > 0
     assert {"report.html", "comparison.rrd"} <= {path.name for path in (tmp_path / "run").iterdir()}
@@ -120,13 +113,13 @@ def test_from_a_lerobot_data_set_to_a_named_effect_by_one_command(hidden, named,
 
 def test_what_is_known_already_is_no_news_to_diagnose(tmp_path: Path) -> None:
     settings = ["source.duration=4", "source.kinds=[ramps,multisine]", 'source.hidden=["torque_bias@b: bias=0.05"]']
-    made = run("record", *made_rig(tmp_path, *settings), folder=tmp_path)
+    made = typed("record", *made_rig(tmp_path, *settings), folder=tmp_path)
     assert made.returncode == 0, made.stderr
     words = ["recording=made"]
-    fitted = run("identify", *words, "effects=[torque_bias@b]", "hydra.run.dir=known", folder=tmp_path)
+    fitted = typed("identify", *words, "effects=[torque_bias@b]", "hydra.run.dir=known", folder=tmp_path)
     assert fitted.returncode == 0, fitted.stderr
     words += ["hydra.run.dir=run"]
-    asked = run("diagnose", *words, "model=known/model.yaml", folder=tmp_path)
+    asked = typed("diagnose", *words, "model=known/model.yaml", folder=tmp_path)
     assert asked.returncode == 0, asked.stderr
     result = json.loads((tmp_path / "run" / "diagnosis.json").read_text())
     assert (result["verdict"], result["effects"]) == ("adequate", [])
@@ -138,7 +131,7 @@ def test_what_is_known_already_is_no_news_to_diagnose(tmp_path: Path) -> None:
     assert effect.parameters["bias"].low <= 0.05 <= effect.parameters["bias"].high
 
     (tmp_path / "other.yaml").write_text("joints: [x]\n")
-    refused = run("diagnose", *words, "model=other.yaml", folder=tmp_path)
+    refused = typed("diagnose", *words, "model=other.yaml", folder=tmp_path)
     assert refused.returncode == 2
     assert "model: joints ['x'] are not those of the recording" in refused.stderr
 

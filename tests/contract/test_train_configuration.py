@@ -1,7 +1,6 @@
 """Every choice of train's configuration composes and instantiates; sources of recordings are those of their class."""
 
 import inspect
-from pathlib import Path
 
 import pytest
 from hydra.utils import get_class, instantiate
@@ -13,21 +12,10 @@ from tactile_cube.agent.networks import Sizes
 from tactile_cube.composition import CONFIG
 from tactile_cube.env import Conditions
 from tactile_cube.training.build import as_environment
-from tactile_cube.training.loggers import open_logger
 from tactile_cube.training.settings import CollectorSettings, RunSettings, TrainingSettings
 
-GROUPS = (
-    "task",
-    "reward",
-    "randomization",
-    "start",
-    "exploration",
-    "curriculum",
-    "agent",
-    "replay",
-    "collector",
-    "training",
-)
+GROUPS = ("agent", "replay", "collector", "training")
+"""Those of the environment are tried in transforms/test_environment_options.py."""
 CHOICES = [f"{group}={file.stem}" for group in GROUPS for file in sorted((CONFIG / group).glob("*.yaml"))]
 CHOICES += [f"+experiment={file.stem}" for file in sorted((CONFIG / "experiment").glob("*.yaml"))]
 
@@ -57,16 +45,6 @@ def test_torchrls_own_loss_runs_the_recipe() -> None:
     differing = {key for key in recipe.agent if recipe.agent[key] != theirs.agent[key]}
     assert differing <= {"_target_", "precision"}
     assert type(instantiate(theirs.agent, _partial_=True)(Sizes(120, 25, 12)).loss) is SACLoss
-
-
-def test_loggers_write_into_the_run_folder(tmp_path: Path) -> None:
-    for option, expected in (("default", ["tensorboard"]), ("csv", [])):
-        (tmp_path / option).mkdir()
-        logger = open_logger(tmp_path / option, 0, {}, **composed(f"logger={option}").logger)
-        if logger is not None:
-            logger.log_metrics({"a": 1.0}, step=1)
-            logger.close()
-        assert [path.name for path in (tmp_path / option).iterdir()] == expected
 
 
 def test_default_worker_count_divides_the_worlds() -> None:

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 import torch
-from omegaconf import OmegaConf
+from omegaconf import DictConfig, OmegaConf
 
 import tactile_cube
 from tactile_cube.agent.networks import Actor, Sizes
@@ -98,9 +98,15 @@ def untouched() -> bool:
     return not Path(MARK).exists() and "stranger" not in sys.modules
 
 
+@cache
+def evaluate() -> DictConfig:
+    """Its configuration as it stands."""
+    return composed("evaluate", [])
+
+
 def evaluated(config: dict[str, Any]) -> None:
     """What evaluate and view make of a configuration."""
-    environment(composed("evaluate", []), PolicySource(HoldPolicy(), "evil", config=config), {})
+    environment(copy.deepcopy(evaluate()), PolicySource(HoldPolicy(), "evil", config=config), {})
 
 
 def deployed(config: dict[str, Any]) -> None:

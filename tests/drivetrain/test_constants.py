@@ -9,9 +9,6 @@ from tests.drivetrain.rigs import finger, wheel
 def test_signs_differ_in_the_side_on_which_the_motor_is() -> None:
     assert DrivetrainConstants().compliance == pytest.approx(0.04)
     assert DrivetrainConstants(sign="printed").compliance == pytest.approx(-0.04)
-
-
-def test_a_rigid_drive_has_no_compliance() -> None:
     assert DrivetrainConstants(stiffness=np.inf).compliance == 0.0
 
 

@@ -39,11 +39,6 @@ def test_the_same_plant_uses_the_same_module() -> None:
     assert len(modules) == 1
 
 
-def test_the_cache_follows_xdg_cache_home(tmp_path, monkeypatch) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert cache_directory() == tmp_path / "tactile_cube"
-
-
 def test_an_unwritable_cache_home_is_replaced_by_the_temporary_directory(tmp_path, monkeypatch) -> None:
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))

@@ -27,11 +27,6 @@ def test_a_bare_number_is_a_value_without_interval(tmp_path: Path) -> None:
     assert read_model(tmp_path / "m.yaml").values["kp"]["q1"] == Estimate(value=3.5, low=3.5, high=3.5)
 
 
-def test_name_and_joint_of_an_effect() -> None:
-    assert (example().effects[0].name, example().effects[0].joint) == ("backlash", "q2")
-    assert EffectEstimate(effect="object_mass").joint is None
-
-
 @pytest.mark.parametrize(
     ("text", "said"),
     [

@@ -180,23 +180,6 @@ def test_chains_are_independent_of_each_other() -> None:
 # --- effects ---------------------------------------------------------------------------------------------------------
 
 
-def test_an_effect_acts_on_its_joint() -> None:
-    plant = Plant([finger()], dt=0.002, effects=EFFECTS)
-    memory = plant.memory(DrivetrainConstants())
-    plain = roll(plant, memory.copy(), waves(100))
-    bare = Plant([finger()], dt=0.002)
-    assert np.array_equal(roll(bare, bare.memory(DrivetrainConstants()), waves(100)), plain)
-    plant.set_effect(memory, CableDrag, "q2", {"stiffness": 0.5, "drag": 0.2})
-    assert not np.array_equal(roll(plant, memory, waves(100)), plain)
-
-
-def test_a_mechanism_effect_changes_the_constants() -> None:
-    plant = Plant([finger()], dt=0.002, effects=EFFECTS)
-    heavy = plant.memory(DrivetrainConstants(), effects=[HeavyTip("q3", mass=0.045)])
-    link = finger().dof_names.index("q3")
-    assert plant.view(heavy, "mass")[0, link] == pytest.approx(0.055 + 0.045)
-
-
 def test_effect_values_may_be_a_batch() -> None:
     plant = Plant([finger()], dt=0.002, effects=EFFECTS)
     memory = np.tile(plant.memory(DrivetrainConstants()), (2, 1))

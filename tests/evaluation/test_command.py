@@ -1,22 +1,14 @@
 """`python -m tactile_cube.evaluate`, as a user types it."""
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 from tests.typed import typed
 
 
-def evaluate(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "tactile_cube.evaluate", *words]
-    environment = os.environ | {"OMP_NUM_THREADS": "1"}
-    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=250)
-
-
 def test_a_baseline_is_judged_filmed_and_recorded(tmp_path: Path) -> None:
-    run = evaluate(tmp_path, "policy=hold", "protocol=smoke", "protocol.seconds=1", f"hydra.run.dir={tmp_path}/run")
+    words = ["policy=hold", "protocol=smoke", "protocol.seconds=1", f"hydra.run.dir={tmp_path}/run"]
+    run = typed("evaluate", *words, folder=tmp_path)
     assert run.returncode == 0, run.stderr
     assert "2 holding" in run.stdout
     data = json.loads((tmp_path / "run" / "results.json").read_text())
@@ -42,9 +34,3 @@ def test_a_baseline_is_tried_in_the_engine_and_the_world_that_are_asked_for(tmp_
         data = json.loads((tmp_path / engine / "results.json").read_text())
         angles.append([row["final_angle"] for row in data["variants"][0]["episodes"]])
     assert angles[0] != angles[1]
-
-
-def test_help_is_quick_and_says_how_to_open_the_recording(tmp_path: Path) -> None:
-    run = evaluate(tmp_path, "--help")
-    assert run.returncode == 0
-    assert "rerun outputs/evaluate" in run.stdout

@@ -26,11 +26,6 @@ def test_a_training_in_stages_means_the_latest_of_its_stages_until_it_has_a_poli
     assert policy_path(str(tmp_path)) == tmp_path / "policy.safetensors"
 
 
-def test_an_empty_run_folder_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="first checkpoint"):
-        policy_path(str(tmp_path))
-
-
 def test_an_unknown_policy_is_refused_with_the_choices() -> None:
     with pytest.raises(InputError, match=r"policy=defalt.*hold, random, scripted.*did you mean policy=default\?$"):
         policy_path("defalt")
@@ -50,13 +45,6 @@ def test_training_begins_from_a_run_with_its_critics_where_it_has_a_checkpoint(t
     assert networks_path(str(tmp_path)) == str(tmp_path / "policy.safetensors")
     (tmp_path / "checkpoint.pt").touch()
     assert networks_path(str(tmp_path)) == str(tmp_path / "checkpoint.pt")
-
-
-def test_training_from_an_unknown_policy_is_refused() -> None:
-    with pytest.raises(
-        InputError, match=r"^training.init_from=nobody: .* default, fingertips, published, robust, table, taught$"
-    ):
-        networks_path("nobody")
 
 
 def test_a_gait_that_was_searched_acts(tmp_path: Path) -> None:

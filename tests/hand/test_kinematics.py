@@ -97,8 +97,5 @@ def test_start_pose_has_every_tip_one_millimetre_off_its_face_at_mid_height() ->
         gap = finger.face @ tip - 0.04 - DLR_HAND2.tip_radius
         assert abs(gap - 1e-3) < 3e-4
         assert np.linalg.norm(tip - finger.face * (finger.face @ tip)) < 5e-4
-
-
-def test_start_pose_lies_within_the_action_limits() -> None:
     assert np.all(DLR_HAND2.start_angles > DLR_HAND2.action_lower)
     assert np.all(DLR_HAND2.start_angles < DLR_HAND2.action_upper)

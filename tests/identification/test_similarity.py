@@ -19,7 +19,6 @@ FINGER = Size()
 SIZES = {
     "a finger's finger": Size(mass=0.01, length=0.1, time=0.1),
     "an excavator": Size(mass=1e4, length=10.0, time=10.0),
-    "a light axis": Size(mass=5.0, slides=True),
     "a machine tool": Size(mass=450.0, length=0.25, slides=True),
 }
 

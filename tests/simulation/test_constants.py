@@ -1,5 +1,3 @@
-import dataclasses
-
 import numpy as np
 import pytest
 
@@ -11,12 +9,6 @@ def test_one_number_means_all_joints_and_all_edges() -> None:
     constants = EpisodeConstants(kp=4.0, cube_size=0.07)
     np.testing.assert_array_equal(constants.kp, np.full(12, 4.0))
     np.testing.assert_array_equal(constants.cube_size, np.full(3, 0.07))
-
-
-def test_a_replaced_constant_leaves_the_others() -> None:
-    constants = dataclasses.replace(EpisodeConstants(kd=np.linspace(0.2, 0.3, 12)), cube_mass=0.06)
-    assert constants.cube_mass == 0.06
-    np.testing.assert_array_equal(constants.kd, np.linspace(0.2, 0.3, 12))
 
 
 def test_vectors_cannot_be_changed_in_place() -> None:
@@ -51,11 +43,6 @@ def test_a_start_normalises_its_quaternion_and_refuses_zero() -> None:
 def test_a_start_whose_vectors_have_different_joints_is_refused() -> None:
     with pytest.raises(InputError, match=r"start.velocities has shape \(3,\); give one number or 12"):
         Start(np.zeros(12), velocities=np.zeros(3))
-
-
-def test_a_policy_step_of_the_presets_lasts_a_tenth_of_a_second() -> None:
-    for options in (SimulationOptions(), SimulationOptions.faithful()):
-        assert options.policy_dt == pytest.approx(0.1)
 
 
 @pytest.mark.parametrize(

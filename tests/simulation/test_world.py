@@ -63,7 +63,7 @@ def test_an_eccentric_or_soft_grasp_leaves_no_trace_in_the_next_episode(world: W
     np.testing.assert_array_equal(run(world, other, start, actions), changed)
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("seed", [0, 1])
 def test_a_squeeze_of_10_mm_holds_the_cube_for_10_s_at_full_gravity(world: World, seed: int) -> None:
     rng = np.random.default_rng(seed)
     quaternion = Rotation.from_euler("xyz", rng.uniform([-0.01, -0.01, -0.1], [0.01, 0.01, 0.1])).as_quat()

@@ -40,16 +40,12 @@ def test_the_replay_comes_back_row_for_row_after_the_ring_went_round(tmp_path: P
     assert (resumed.learner.replay.buffer[:] == whole.learner.replay.buffer[:]).all()
 
 
-@pytest.mark.parametrize("damage", ["flip", "cut", "gone"])
+@pytest.mark.parametrize("damage", ["flip", "gone"])
 def test_damage_to_the_newest_is_said_and_the_one_before_is_used(ended, reference, damage, capsys) -> None:
     path = ended / FILE
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 1
-    {
-        "flip": lambda: path.write_bytes(content),
-        "cut": lambda: path.write_bytes(content[: len(content) // 2]),
-        "gone": path.unlink,
-    }[damage]()
+    path.write_bytes(content) if damage == "flip" else path.unlink()
     resumed = tiny_run(ended)
     assert resumed.learner.steps == 80
     resumed.announce()

@@ -51,7 +51,7 @@ def test_resumed_run_equals_an_uninterrupted_one(tmp_path: Path, agent_settings:
     assert whole.learner.episodes.summary() == resumed.learner.episodes.summary()
 
 
-@pytest.mark.parametrize(("at", "number"), [(0, signal.SIGINT), (6, signal.SIGINT), (6, signal.SIGTERM)])
+@pytest.mark.parametrize(("at", "number"), [(0, signal.SIGINT), (6, signal.SIGTERM)])
 def test_ctrl_c_ends_a_run_at_once_and_it_goes_on_from_the_last_barrier(
     tmp_path: Path, reference: torch.Tensor, at: int, number: int, capsys: pytest.CaptureFixture[str]
 ) -> None:

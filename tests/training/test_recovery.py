@@ -74,8 +74,7 @@ def send(number: int, run: Run) -> None:
     os.kill(run.learner.collection._processes[1].pid, number)  # type: ignore[attr-defined]
 
 
-@pytest.mark.parametrize("at", [1, 6])
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+@pytest.mark.parametrize(("number", "at"), [(signal.SIGKILL, 1), (signal.SIGSTOP, 6)])
 def test_a_killed_or_stopped_worker_is_replaced(tmp_path, reference, number, at, capsys) -> None:
     run = disturbed(tmp_path, at, partial(send, number))
     assert torch.equal(weights(run), reference)

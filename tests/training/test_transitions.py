@@ -137,11 +137,3 @@ def test_what_reward_terms_add_is_logged_and_lost_worlds_counted() -> None:
     again = EpisodeStatistics((), ("spin", "tips"), Learnability({"cube_mass": Uniform(0.0, 1.0)}, 0.5))
     again.load_state_dict(statistics.state_dict())
     assert again.state_dict() == statistics.state_dict()
-
-
-def test_statistics_come_back_from_a_checkpoint() -> None:
-    first, second = EpisodeStatistics(), EpisodeStatistics()
-    first.add(block([[1.0, 2.0]], [[True, True]]))
-    second.load_state_dict(first.state_dict())
-    assert first.summary() == second.summary()
-    assert second.angles.maxlen == WINDOW

@@ -19,9 +19,8 @@ from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.replay.simulator import Simulated
 from tactile_cube.measurement.units import of_joint
 from tactile_cube.visualization.charts import MEASURED, band, overlay
-from tactile_cube.visualization.comparison_episode import trial_starts, write_comparison
 from tactile_cube.visualization.comparison_report import comparison_report, summary
-from tactile_cube.visualization.diagnosis_report import diagnosis_report, identification_report, stage_section
+from tactile_cube.visualization.diagnosis_report import diagnosis_report, identification_report
 from tactile_cube.visualization.report import Report, Section, Table, write_report
 from tests.identification.easy_safety import half_used
 from tests.measurement.small_rig import URDF, write
@@ -273,31 +272,8 @@ def test_what_the_trials_do_not_prove_is_named(comparison: Comparison, tmp_path:
     assert "8 held-out windows are too few to rule out chance" in text
 
 
-def test_the_identification_page_shows_the_error_of_each_stage(comparison: Comparison, tmp_path: Path) -> None:
-    joints = {"nominal": {"a": 0.007, "b": 0.006}, "with_effects": {"a": 0.0006, "b": 0.0005}}
-    text = page(identification_report(comparison, DIAGNOSIS["error"], joints, "cmd", "model.yaml"), tmp_path / "i.html")
-    assert "fell from 7 mrad to 0.6 mrad" in text
-    assert "kd a" in text
-    assert "0.2 .. 0.24" in text
-
-
 def test_texts_are_escaped(tmp_path: Path) -> None:
     section = Section("a", ["<script>alert(1)</script>"], [Table(("x",), [("<b>",)])])
     write_report(Report("t", "a", "good", [section], "f"), tmp_path / "r.html")
     assert "<script>" not in (tmp_path / "r.html").read_text()
     assert "<b>" not in (tmp_path / "r.html").read_text().split("</nav>")[1]
-
-
-def test_the_rerun_recording_is_written_with_all_trials(comparison: Comparison, tmp_path: Path) -> None:
-    write_comparison(comparison, tmp_path / "c.rrd")
-    assert (tmp_path / "c.rrd").stat().st_size > 10_000
-    assert trial_starts(comparison) == [0.0, comparison.recording.trials[0].duration + 1.0]
-
-
-@pytest.mark.parametrize(("joints", "header"), [(3, "j2"), (12, "as stated")])
-def test_the_error_table_has_many_joints_in_its_rows(joints: int, header: str) -> None:
-    errors = {f"j{k}": 1e-3 * k for k in range(joints)}
-    section = stage_section({"nominal": 1e-3}, {"nominal": errors, "with_effects": errors})
-    (table,) = (block for block in section.blocks if isinstance(block, Table))
-    assert header in table.header
-    assert len(table.rows) == (2 if joints == 3 else 12)

@@ -100,10 +100,6 @@ def test_the_trail_follows_a_corner_of_the_cube(recording: Path) -> None:
     np.testing.assert_allclose(strips[-1][0][-1], corner, atol=1e-6)
 
 
-def test_the_blueprint_is_inside(recording: Path) -> None:
-    assert len(RrdReader(recording).blueprints()) == 1
-
-
 def test_an_episode_without_a_trace_can_be_recorded(tmp_path: Path) -> None:
     write_episode(episode(steps=5, trace={}), tmp_path / "short.rrd")
     assert len(rows(tmp_path / "short.rrd", "/cube", "Transform3D:translation")) == 6

@@ -130,23 +130,12 @@ def test_effects_that_these_trials_do_not_tell_apart_stand_together(looks: list[
     assert {"cogging"} in groups
 
 
-def test_where_the_model_fails_is_what_compare_says(bench: Workbench) -> None:
-    compared = bench.comparison(bench.never_fitted[0])
-    assert compared.failing_intervals
-    assert compared.floor == bench.floor
-
-
 def test_an_experiment_is_proposed_for_the_effect_that_was_added(bench: Workbench, explained: Workbench) -> None:
     with pytest.raises(InputError, match="add an effect first"):
         bench.propose()
     proposed = explained.propose()
     assert proposed.decides
     assert set(proposed.predictions) == {"refitted", f"+ {STRIBECK}"}
-
-
-def test_what_cannot_be_seen_is_named_with_its_reason(bench: Workbench) -> None:
-    assert all(one.joint == "a" and one.why for one in bench.unseen("a"))
-    assert bench.unseen("a")
 
 
 def test_a_saved_model_is_the_next_one_to_begin_with(explained: Workbench, measured: Recording, tmp_path: Path) -> None:

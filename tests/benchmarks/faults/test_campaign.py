@@ -2,6 +2,7 @@
 
 import ast
 import random
+import shutil
 from pathlib import Path
 
 import pytest
@@ -11,23 +12,30 @@ import tactile_cube.training
 from benchmarks.faults.campaign import KINDS, SHORT, damaged_checkpoints, results, same, strike, undisturbed
 
 
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, float]:
+    """The folder of a run without a fault, and how long it took [s]."""
+    run = tmp_path_factory.mktemp("runs") / "undisturbed"
+    return run, undisturbed(run, SHORT)[1]
+
+
 @pytest.mark.timeout(900)
-def test_killed_processes_cost_nothing_and_leave_nothing(tmp_path: Path) -> None:
-    reference, seconds = undisturbed(tmp_path / "undisturbed", SHORT)
+def test_killed_processes_cost_nothing_and_leave_nothing(sound: tuple[Path, float], tmp_path: Path) -> None:
+    run, seconds = sound
     moments = random.Random(0)
     for kind in KINDS[:2]:
         moment = moments.uniform(0.3, 0.9) * seconds
-        outcome = strike(kind, tmp_path / kind.name.replace(":", ""), moment, SHORT, reference)
+        outcome = strike(kind, tmp_path / kind.name.replace(":", ""), moment, SHORT, results(run))
         assert (outcome.orphans, outcome.damaged, outcome.equal) == (0, 0, True), outcome
         assert outcome.status is not None, "it hung"
 
 
-def test_the_campaign_sees_other_bits_and_damage(tmp_path: Path) -> None:
-    run = tmp_path / "run"
-    reference, _ = undisturbed(run, SHORT)
-    assert same(results(run), reference)
-    reference["agent"]["loss"]["log_alpha"] += 1e-6
-    assert not same(results(run), reference)
+def test_the_campaign_sees_other_bits_and_damage(sound: tuple[Path, float], tmp_path: Path) -> None:
+    run = shutil.copytree(sound[0], tmp_path / "run")
+    other = results(run)
+    assert same(results(run), other)
+    other["agent"]["loss"]["log_alpha"] += 1e-6
+    assert not same(results(run), other)
     assert damaged_checkpoints(run) == 0
     (run / "checkpoint_before.pt").write_bytes(b"half")
     assert damaged_checkpoints(run) == 1

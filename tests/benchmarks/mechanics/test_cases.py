@@ -6,7 +6,7 @@ import pytest
 from benchmarks.mechanics import CASES, Answer
 from benchmarks.mechanics.case import Setting
 from benchmarks.mechanics.page import mechanics_page
-from benchmarks.mechanics.refinement import Outcome, Refinement, refined
+from benchmarks.mechanics.refinement import Outcome, Refinement
 from tactile_cube.simulation import SimulationOptions
 
 ENGINES = ("bullet", "mujoco")
@@ -42,9 +42,3 @@ def test_refinement_changes_nothing_that_is_resolved_and_shows_what_is_not() -> 
 
     row = mechanics_page([], [Refinement("mujoco", 3e-3, of(-1.0), of(-1.02))], "x")
     assert "| mujoco, 3 mm | 0.00 mm | 0.00 N | 0 mrad | 20 mrad (-1.02 rad) | 0 mrad (0.10 rad) | 0.0 mm |" in row
-
-
-def test_refined_options_keep_the_policy_step() -> None:
-    fine = refined(SimulationOptions("mujoco"))
-    assert (fine.dt, fine.solver_iterations) == (pytest.approx(2e-4), 300)
-    assert fine.policy_dt == pytest.approx(0.1)

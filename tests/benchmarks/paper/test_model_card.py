@@ -72,12 +72,6 @@ def test_the_card_says_how_it_was_made_and_what_it_does() -> None:
         assert fact in card
 
 
-def test_the_card_of_a_fine_tuned_policy_names_the_demonstrations_of_the_run_before(tmp_path: Path) -> None:
-    (tmp_path / "card.md").write_text(model_card("default", INFO, RUNS, [], ""))
-    taught = "a scripted gait in 30 % of the episodes, imitated with weight 2 (curriculum)"
-    assert read_card(tmp_path / "card.md")["demonstrations"] == taught
-
-
 def test_the_ancestry_lists_each_run_with_its_settings() -> None:
     searched, taught, alone = (row.strip("| ").split(" | ") for row in ancestry_table(RUNS)[2:])
     assert searched[:4] == ["search_gait", "5 000", "0.25", "0.5"]
@@ -94,12 +88,6 @@ def test_the_ancestry_lists_each_run_with_its_settings() -> None:
 def test_the_ancestry_is_read_back_from_a_card() -> None:
     runs = [Ancestor("search_gait"), *RUNS[1:]]
     assert read_table(model_card("default", INFO, runs, [], "")) == runs
-
-
-def test_starts_in_grasps_are_named() -> None:
-    start = {"_target_": "tactile_cube.randomization.GraspStarts", "share": 0.5}
-    assert in_words({"start": start})["starts"] == "50 % in stable grasps"
-    assert in_words({"start": {**start, "share": 1.0}})["starts"] == "in stable grasps"
 
 
 def test_a_run_that_a_gait_taught_brings_the_hours_of_its_search(tmp_path: Path) -> None:

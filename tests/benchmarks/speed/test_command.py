@@ -21,9 +21,3 @@ def test_a_section_ends_in_a_table_a_page_and_numbers(tmp_path: Path) -> None:
     found = json.loads((tmp_path / "benchmark.json").read_text())
     assert found["machine"]["torch"]
     assert [section["name"] for section in found["sections"]] == ["update"]
-
-
-def test_an_unknown_section_is_refused_with_the_choices() -> None:
-    run = speed("update", "speed")
-    assert run.returncode == 2
-    assert "invalid choice: 'speed' (choose from 'environment'" in run.stderr

@@ -1,8 +1,6 @@
 """Rates and ratios, and their tables."""
 
-import json
-
-from benchmarks.speed.report import Figure, Growth, Section, durations, rates, table
+from benchmarks.speed.report import Growth, Section, durations, rates, table
 from benchmarks.speed.timing import Timing
 
 TIMINGS = {"ours": Timing(cpu=[0.1, 0.2, 0.3]), "peer": Timing(cpu=[0.4, 0.4, 0.4])}
@@ -28,10 +26,6 @@ def test_durations_are_milliseconds_with_quartiles_in_order() -> None:
     assert ours.low < ours.value < ours.high
 
 
-def test_without_the_yardstick_there_are_no_ratios() -> None:
-    assert all(figure.ratio is None for figure in rates({"ours": TIMINGS["ours"]}, "peer", "updates/s"))
-
-
 def test_the_table_shows_figures_curves_and_what_is_missing() -> None:
     text = table(section())
     assert "| ours | 5.00" in text or "| ours | 5 " in text
@@ -41,15 +35,3 @@ def test_the_table_shows_figures_curves_and_what_is_missing() -> None:
     assert "not installed (pip install mujoco)" in text
     widths = {len(line) for line in text.splitlines() if "updates/s" in line}
     assert len(widths) == 1
-
-
-def test_columns_that_say_nothing_are_left_out() -> None:
-    text = table(Section("startup", "waiting", figures=[Figure("--help", 0.2, 0.1, 0.3, "s")]))
-    assert "ratio" not in text
-    assert "note" not in text
-
-
-def test_a_section_is_plain_data() -> None:
-    again = json.loads(json.dumps(section().plain()))
-    assert again["figures"][0]["name"] == "ours"
-    assert again["growth"][0]["y"] == [9.0, 15.25]

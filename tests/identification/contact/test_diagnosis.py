@@ -100,18 +100,16 @@ def test_an_adequate_contact_adds_nothing_to_the_model() -> None:
     assert diagnosis({}).into(ModelFile(joints=["a"]), alone=False).effects == []
 
 
-@pytest.mark.parametrize(("report", "files"), [(True, {"report.html"}), (False, set())])
-def test_a_report_is_written_where_it_is_asked_for(report: bool, files: set[str], tmp_path: Path) -> None:
+def test_a_report_is_written_beside_model_and_answer(tmp_path: Path) -> None:
     recording, found = read_recording(write(tmp_path / "r")), diagnosis(LATERAL)
     model = found.into(ModelFile(joints=list(recording.joints)), alone=True)
     data = found.as_json() | {"known_effects": [], "seconds": 1.0}
     job = called_job("diagnose", {"recording": tmp_path / "r"})
-    DiagnosisResult(recording, None, None, found, model, data, job).write(tmp_path / "out", report)
-    assert {one.name for one in (tmp_path / "out").iterdir()} == {"model.yaml", "diagnosis.json"} | files
-    if report:
-        page = (tmp_path / "out" / "report.html").read_text()
-        assert "effects=[lateral_friction]" in page
-        assert "takes" in page
+    DiagnosisResult(recording, None, None, found, model, data, job).write(tmp_path / "out")
+    assert {one.name for one in (tmp_path / "out").iterdir()} == {"model.yaml", "diagnosis.json", "report.html"}
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "effects=[lateral_friction]" in page
+    assert "takes" in page
 
 
 @pytest.fixture(scope="module")

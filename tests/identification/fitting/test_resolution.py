@@ -49,15 +49,10 @@ def test_a_fast_controller_is_simulated_as_slowly_as_the_sensors_allow(tmp_path,
     assert bool(said) == (rate != 4000.0)
 
 
-def test_a_rate_that_no_slower_one_divides_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("rate", [700.0, 200.0], ids=["neither 5 nor 6 steps a row divide into 7", "slow already"])
+def test_a_rate_that_no_slower_one_divides_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rate: float) -> None:
     monkeypatch.setattr(resolution, "step_error", lambda *_: 0.0)
-    stated = read_recording(write(tmp_path, lambda data: data["controller"].update(rate_hz=700.0)))
-    assert resolved(stated, EFFECTS, print) is stated, "neither 5 nor 6 steps a row divide into 7"
-
-
-def test_a_slow_controller_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(resolution, "step_error", lambda *_: 0.0)
-    stated = read_recording(write(tmp_path, lambda data: data["controller"].update(rate_hz=200.0)))
+    stated = read_recording(write(tmp_path, lambda data: data["controller"].update(rate_hz=rate)))
     assert resolved(stated, EFFECTS, print) is stated
 
 

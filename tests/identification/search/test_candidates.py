@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tactile_cube.drivetrain.effects import catalogue, find_effect
+from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.drivetrain.effects.effect import FINGER, Scales
 from tactile_cube.identification.search.candidates import (
     Candidate,
@@ -90,9 +90,6 @@ def test_where_torques_are_commanded_a_saturation_starts_among_them(tmp_path: Pa
     assert len(starts) == 9
     assert all(0.2 * largest < start <= largest for start in starts)
     np.testing.assert_allclose(np.diff(np.log(starts)), np.log(starts[1] / starts[0]))  # no wide gap between any two
-
-
-KNOWN = candidates({"q2": FINGER}, list(catalogue().values()))
 
 
 def fitted(*names: str, joints: tuple[str, ...] = ("q2",)) -> tuple[list[Candidate], Model]:
