@@ -23,7 +23,7 @@ from tactile_cube.whole_file import write_json, written_together
 
 @dataclass(frozen=True)
 class MonitorResult:
-    """What has changed.
+    """Changes of a machine since its model was identified.
 
     Attributes:
         before: the reference model.
@@ -135,7 +135,7 @@ def monitor(
 def run_monitor(
     job: Job, recording: Recording | PathLike, model: ModelFile | PathLike, say: Say | None = None
 ) -> MonitorResult:
-    """Refit the reference's effects on the newest recording, and hold the numbers and the errors side by side.
+    """Refit the reference's effects on the newest recording, and compare parameters and errors.
 
     Numbers that trade places with each other differ from recording to recording by more than their intervals say; a
     machine that has changed is not followed any more by the numbers as they were.

@@ -41,7 +41,7 @@ NOT_A_STAGES = re.compile(r"(experiment|stages|judgement|name)\b")  # keys of th
 ENGINES = ("bullet", "mujoco")
 GRASPS = 1000  # as many as those that come with the package
 COUNTED = ("steps", "updates", "episodes", "wall_hours", "simulating_hours", "learning_hours")
-"""Columns of metrics.csv that go on from stage to stage."""
+"""Columns of metrics.csv that continue from stage to stage."""
 
 
 @dataclass(frozen=True)
@@ -140,7 +140,7 @@ def average(run: PathLike, *, last: int | None = None, output: PathLike | None =
 
 
 def run_averaging(job: Job) -> AveragedPolicy:
-    """Write the policy of a job."""
+    """Average the policies that a job names, and write the result."""
     run = Path(job.config.run)
     actor, info = averaged(kept_policies(run, job.config.last))
     output = Path(job.config.output or run / "policy_averaged.safetensors")
@@ -149,7 +149,7 @@ def run_averaging(job: Job) -> AveragedPolicy:
 
 
 def run_training(job: Job, stage: str = "", later: int = 0) -> TrainingResult:
-    """Train what a job says, in one run or in stages, and say how it went.
+    """Run a training job, in one run or in stages, and return its result.
 
     Of a stage of several, `stage` is what lines of progress begin with, and the stages after it usually take `later`
     environment steps.
@@ -236,7 +236,7 @@ def _overview(stages: Sequence[Job], results: Sequence[TrainingResult]) -> str:
 
 
 def judged(job: Job, last: Path) -> str:
-    """Write the mean of the last stage's policies, and judge it in fresh draws of its worlds, in both engines."""
+    """Write the mean of the last stage's policies, and evaluate it in fresh draws of its worlds, in both engines."""
     kept = min(composed("average", []).last, len(list(last.glob("policy_[0-9]*.safetensors"))))
     policy = job.folder / POLICY
     save_policy(policy, *averaged(kept_policies(last, kept) if kept else [last / POLICY]))

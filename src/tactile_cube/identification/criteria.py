@@ -1,4 +1,4 @@
-"""The numbers that decide what a diagnosis answers, each stated once; conf/criteria holds them with their reasons."""
+"""Thresholds of a diagnosis; conf/criteria states them with their reasons."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ from tactile_cube.errors import InputError
 
 @dataclass(frozen=True)
 class Criteria:
-    """Errors are in units of the sensor noise, shares are of squared errors, all on held-out trials.
+    """Thresholds: errors in units of the sensor noise, shares of squared errors, all on held-out trials.
 
     Attributes:
         floor: error above which a joint is off, so that something is looked for there.
@@ -46,4 +46,4 @@ class Criteria:
 
 
 STANDARD = Criteria()
-"""What conf/criteria/standard.yaml says too."""
+"""The defaults, the same as in conf/criteria/standard.yaml."""

@@ -78,7 +78,7 @@ def spreads(scales: Scales) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class StandardModel:
-    """A model with the standard effects, and how it does.
+    """Fitted standard model, and its errors.
 
     Attributes:
         model: with those effects that are found otherwise than stated; what is stated where no fit was better.

@@ -1,4 +1,4 @@
-"""From everything that was tried to an answer: one of five verdicts, and the simulations that it asks for."""
+"""Decide on one of five verdicts from the results of a search and the simulations that it needs."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -31,7 +31,7 @@ Kind = Literal["adequate", "missing_effect", "ambiguous", "partly_explained", "u
 
 @dataclass(frozen=True)
 class Verdict:
-    """The answer.
+    """Verdict of a diagnosis.
 
     Attributes:
         kind: see issue and report.
@@ -98,7 +98,7 @@ def unexplained_joints(chosen: Explanation, joints: tuple[str, ...], criteria: C
 
 @dataclass(frozen=True)
 class Unexplained:
-    """What is left at a joint.
+    """Unexplained error of a joint.
 
     Attributes:
         joint: its name.

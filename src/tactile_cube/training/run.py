@@ -25,7 +25,7 @@ from tactile_cube.whole_file import write_whole
 FILE, POLICY, BEST_POLICY, FILM = "finished.json", "policy.safetensors", "policy_best.safetensors", "trial.gif"
 INTERRUPTED = "interrupted"
 MASTERED = "mastered:"
-"""How the reason begins for which a run ended that came to its goal."""
+"""First words of the reason if a run ended because it reached its goal."""
 ATTEMPTS = 3
 """Times in a row that workers may fail without a barrier reached in between."""
 

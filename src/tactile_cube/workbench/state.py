@@ -60,7 +60,7 @@ COMMAND = "python -m tactile_cube.workbench recording={}"
 
 @dataclass(frozen=True)
 class ModelStage:
-    """One model on the way, and how it does on the trials that are untouched."""
+    """Model after one change, and its error on the untouched trials."""
 
     label: str  # `stated`, `refitted`, `+ NAME@JOINT`, `- NAME@JOINT` or `by hand`
     fit: Fit  # what it was fitted by; of the stated model, and of values set by hand, the fit that came before
@@ -74,7 +74,7 @@ class ModelStage:
 
 @dataclass(frozen=True)
 class Look:
-    """An effect beside the model in force, after a few steps of its own numbers."""
+    """Effect added to the model in force, after a few steps of its own parameters."""
 
     candidate: Candidate  # the effect in the form that does best
     model: Model  # with it
@@ -83,7 +83,7 @@ class Look:
 
     @property
     def name(self) -> str:
-        """Of the effect."""
+        """Name of the effect."""
         return effect_path(self.candidate.effect)
 
 

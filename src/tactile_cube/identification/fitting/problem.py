@@ -124,7 +124,7 @@ class Problem:
 
     @cached_property
     def alike(self) -> list[int]:
-        """Numbers (G,) of the segments that a wrong law misses alike: of one command, about as late in it."""
+        """Group numbers (G,) of segments with similar model errors: the same command at about the same time."""
         numbers: dict[tuple[int, int], int] = {}
         found = []
         for trial, time in zip(self.windows.trial, self.windows.time, strict=True):

@@ -1,4 +1,4 @@
-"""Time steps that the sensors cannot tell from finer ones, and the final fit with 95 % intervals."""
+"""Simulation steps whose error is hidden by the sensor noise, and the final fit with 95 % intervals."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -65,7 +65,7 @@ def finer(windows: Windows, times: int) -> Windows:
 FINEST = 8  # times as short steps at most where no rate is stated: so much longer does a diagnosis take
 HIDDEN = 0.2  # of the sensor noise: its square is `criteria.least_gain`, so that mending it is no reason for an effect
 StepError = Callable[[Recording, int], float]
-"""What steps so many times as short change in a recording's prediction [sensor noise]."""
+"""(recording, factor) -> change of its prediction by steps so many times as short [sensor noise]."""
 
 
 def resolved(

@@ -1,4 +1,4 @@
-"""In which unit a column is: what the user says, or its name, or its values."""
+"""Unit of a column, from the user, its name or its values."""
 
 import json
 import re
