@@ -138,7 +138,7 @@ def with_recipe(name: str, words: list[str]) -> list[str]:
     return [*words[:first], f"+experiment={RECIPE[name]}", *words[first:]]
 
 
-SHORTEST = 5  # letters of the beginning of a name that tell it
+SHORTEST = 5  # letters from which on the beginning of a name identifies it
 
 
 def suggestion(word: str, known: Iterable[str], prefix: str = "") -> str:

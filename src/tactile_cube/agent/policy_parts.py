@@ -45,7 +45,7 @@ class _Environment(BaseModel):
     reward: Part | None = None
     randomization: Part | None = None
     start: Part | None = None
-    exploration: Any = Field(default=None, exclude=True)  # of the training alone
+    exploration: Any = Field(default=None, exclude=True)  # used in training only
     curriculum: Any = Field(default=None, exclude=True)
     constants: Part | None = None
     simulation: Part | None = None
@@ -87,7 +87,7 @@ def making(label: str) -> Iterator[None]:
         yield
     except InputError:
         raise
-    except Exception as error:  # of any kind: the values are a stranger's
+    except Exception as error:  # any kind of error: the values are untrusted
         if isinstance(error.__cause__, InputError):
             raise error.__cause__ from None
         raise InputError(f"{label}: its configuration cannot be used: {' '.join(str(error).split())}") from error

@@ -284,7 +284,7 @@ def _tick(loop: ControlLoop, robot: Robot, now: float, run: LoopRun, log: LoopLo
     run.ticks[round(1e6 * (time.perf_counter() - began))] += 1
     if q_d is None:
         return
-    robot.send(q_d.copy())  # what is sent is the robot's
+    robot.send(q_d.copy())  # a copy: the robot may keep what it is sent
     loop.sent()
     if log is not None and running and loop.accepted is not None and loop.accepted is not before:
         log.append(loop.accepted, q_d)

@@ -11,7 +11,7 @@ from scipy.stats import mannwhitneyu
 from tactile_cube.evaluation.protocol import UNCHANGED
 from tactile_cube.evaluation.verdict import SUCCESS, EpisodeResult, EpisodeVerdict
 
-NO_PROPERTY = ("seed", "force_seed")  # where random numbers come from: larger is not more of anything
+NO_PROPERTY = ("seed", "force_seed")  # seeds: their size has no physical meaning
 SIGNIFICANT = 0.05  # for all constants together: one false name in twenty evaluations
 LEAST = 5  # episodes lost and kept, below which no test can tell
 

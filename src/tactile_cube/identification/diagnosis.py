@@ -144,7 +144,7 @@ def beside_disturbances(inquiry: Inquiry) -> Inquired:
 
 
 UNPROVEN = 3
-MOST_STEPS = 1000  # from row to row: more are a sign of a wrong inertia, and would take days
+MOST_STEPS = 1000  # simulation steps a row: more are a sign of a wrong inertia, and would take days
 Say = Callable[[str], None]
 
 

@@ -138,7 +138,7 @@ def _intervals(failing: NDArray[np.int64]) -> list[tuple[int, int]]:
     return [(int(part[0]), int(part[-1])) for part in np.split(failing, edges + 1)]
 
 
-SEGMENTS = 32  # enough to tell late commands from laws
+SEGMENTS = 32  # enough to separate late commands from laws
 NEARER = -0.5  # rows: a reading that is as early comes nearer to its stamp with commands a row earlier
 
 

@@ -54,7 +54,7 @@ def decide(findings: Findings, criteria: Criteria = STANDARD) -> Verdict:
     if not found:
         small = base.largest_error <= criteria.adequate
         return Verdict("adequate", base) if small else Verdict("unknown_effect", closest((), findings, criteria))
-    # where none is as good as the best, that one ends at an edge and stands in for what is missing beside the others
+    # if none is as good as the best, the best has a parameter at its bound and absorbs what the others lack
     chosen = simplest(plausible or possible, criteria) if possible else base
     if not nameable(chosen, base, criteria):
         return Verdict("unknown_effect", closest(likely if plausible else found, findings, criteria))

@@ -147,7 +147,7 @@ def build_run(
             _fit("the run's checkpoint", lambda: learner.load_state_dict(saved["learner"]))
         elif training.init_replay:
             learner.replay.load_state_dict(_replay_of(training.init_from))
-        if training.resume == "never":  # nothing refuses any more
+        if training.resume == "never":  # all checks have passed
             _clear(folder, checkpoints)
         ledger = Ledger(folder / LEDGER, collection.cpu_seconds, in_process=collector.kind == "single")
         known = {key: saved[key] for key in ("best_angle", "best_score", "tried") if key in saved} if saved else {}
@@ -165,7 +165,7 @@ def build_run(
             trial=environment.trial,
             **known,
         )
-        held.pop_all()  # it is the run's from here
+        held.pop_all()  # the run closes it from here on
     return run
 
 

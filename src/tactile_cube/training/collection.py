@@ -265,11 +265,11 @@ class MultiSyncCollection:
                 if future.done() or time.monotonic() >= until:
                     raise
                 if not all(process.is_alive() for process in getattr(self._weights.context, "procs", ())):
-                    self._kill()  # what waits for it, says so then
+                    self._kill()  # the call that waits for it then fails
                     until = time.monotonic() + LAST_START
 
     def _kill(self) -> None:
-        idle = self._thread.submit(lambda: None)  # before, it may start one more
+        idle = self._thread.submit(lambda: None)  # until this has run, the thread may start one more process
         until = time.monotonic() + LAST_START
         while not idle.done() and time.monotonic() < until:
             self._kill_children()

@@ -183,7 +183,7 @@ class Desk:
                 return
             found = bench.candidates(joint, stop=lambda: self._queued > 0)
             if found is None:
-                self.look(joint)  # after what somebody is waiting for
+                self.look(joint)  # again, after the work that a user waits for
             else:
                 self.explainable[joint] = bench.explainable(joint)
                 self.looks[joint] = found
@@ -273,7 +273,7 @@ def _path(text: str) -> Path:
         path.lstat()
     except (FileNotFoundError, NotADirectoryError):
         return path
-    except (OSError, RuntimeError, ValueError) as error:  # a NUL, 10 000 characters, nobody's home
+    except (OSError, RuntimeError, ValueError) as error:  # a NUL, 10 000 characters, the home of an unknown user
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{text[:LABEL]!r}: no name of a file here: {reason}; type another one") from None
     return path

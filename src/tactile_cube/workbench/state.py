@@ -50,9 +50,9 @@ from tactile_cube.workbench.parameters import BoundedSearch, Value
 Array = NDArray[np.float64]
 STATED, REFITTED, BY_HAND = "stated", "refitted", "by hand"
 BEGUN = 2  # stages of a model to which nothing was added: stated, refitted
-AT_ONCE = 24  # candidates that are screened between two looks at who waits
+AT_ONCE = 24  # candidates that are screened before checking whether other work waits
 RANKED, LEAST = 10, 0.005  # effects that a look shows, and the share that each takes away at least
-ALIKE = 0.95  # correlation of what two laws change, beside all constants, from which on these trials do not part them
+ALIKE = 0.95  # correlation of two laws' effects, beside all constants, from which on these trials do not separate them
 MOST = 50
 """Changes that can be undone; each keeps a fit and a judgement, some MB."""
 COMMAND = "python -m tactile_cube.workbench recording={}"
@@ -352,7 +352,7 @@ class Workbench:
         judgement = self.search.judged(fit.model)
         model = fit.model.with_offsets(judgement.model.offsets)
         model = model.with_offsets(nominal_model(self.untouched, self.known).offsets)
-        fit = replace(fit, columns=np.zeros(0), residual=np.zeros(0))  # many MB, and taken anew by whoever builds on it
+        fit = replace(fit, columns=np.zeros(0), residual=np.zeros(0))  # many MB, and computed anew where needed
         errors, over_noise = self._tested(fit.model)
         return ModelStage(label, fit, model, judgement, over_noise, errors, half_width, final)
 

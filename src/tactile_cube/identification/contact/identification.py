@@ -224,7 +224,7 @@ class ContactSearch:
         parent, found = Proposal((), self.base.fit), dict[frozenset[tuple[str, str]], Proposal]()
         most = self.criteria.floor
         while len(parent.effects) < MOST and self.problem.judged(parent.fit.model).joint_errors.max() > most:
-            most = self.criteria.adequate  # what a world with the true effects leaves is no reason for one more
+            most = self.criteria.adequate  # the true effects leave as much: no reason for one more
             grown = sorted(self.grown(parent), key=lambda one: one.price(self.criteria))
             found |= {named_by(one.effects): one for one in grown}
             if not grown or grown[0].price(self.criteria) >= parent.price(self.criteria):

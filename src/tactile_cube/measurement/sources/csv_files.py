@@ -312,7 +312,7 @@ def _doubts(
     """Yield doubts about units and gains; a torque that agrees with the controller's law needs no other proof."""
     try:
         gains = gains_of(description, None, "controller")
-    except ValueError:  # which is said when the recording is read
+    except ValueError:  # reported when the recording is read
         return
     first = trials[0]
     signals = TrialColumns(first.time, first.command, first.position, first.torque)

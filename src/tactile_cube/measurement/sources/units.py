@@ -61,7 +61,7 @@ class Unit:
     size: float  # in SI units
     source: str  # where the unit was found
     zero: float = 0.0  # the reading that is zero
-    doubt: str = ""  # what nothing proves
+    doubt: str = ""  # what is assumed without proof
 
     @property
     def said(self) -> bool:
