@@ -122,8 +122,8 @@ def _entry(key: str, value: Any, place: str, label: str) -> Any:
     if str(value) not in shipped:
         group = "hand" if key == "urdf" else "object" if ".object" in place else "start"
         raise InputError(
-            f"{label}: {place} is {str(value)[:60]!r}, a file that is none of the package's, and a policy has "
-            f"no other read; name it yourself: {group}=..., with the options that it was trained with"
+            f"{label}: {place} is {str(value)[:60]!r}, a file that is none of the package's; a policy file "
+            f"may name no other; choose it yourself: {group}=..., with the options that it was trained with"
         )
     return shipped[str(value)]
 

@@ -85,8 +85,8 @@ def _setting(config: Any, network: Network, trained: bool = True) -> TrainingSet
     if hand is None and setting.hand.drive and config.get("robot", {}).get("_target_") != SIMULATED:
         name = setting.hand.name
         raise InputError(
-            f"{network.label}: what the drives of hand '{name}' bear, and so the limits of every command, would come "
-            f"from the policy's file alone; name the hand: hand={name}"
+            f"{network.label}: what the drives of hand '{name}' bear, which limits every command, would be known from "
+            f"the policy's file alone; name the hand: hand={name}"
         )
     return setting
 

@@ -28,8 +28,8 @@ class MonitorResult:
     Attributes:
         before: the reference model.
         refitted: the same effects fitted to the newest recording.
-        drifts: every number that both know, the least probable difference first.
-        changed: those that are no chance, where the held-out trials speak against the numbers as they were.
+        drifts: every parameter of both models, the least probable difference first.
+        changed: the significant ones, if the held-out trials reject the old values.
         errors: held-out error over the sensor noise: `before`, of the reference on its own recording; `as_before`, of
             the reference on the newest; `now`, of the refitted model there.
         missing: whether the refitted model has become so much worse that something new is missing.

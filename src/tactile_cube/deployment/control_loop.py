@@ -103,7 +103,7 @@ class ControlLoop:
 
     Attributes:
         reason: why it stopped; "" before.
-        doubted: measurements that were not believed; `doubt` says why the last of them was not.
+        doubted: number of rejected measurements; `doubt` says why the last of them was rejected.
         q_n: desired angles of the policy `(joints,)` [rad]; q_f are the filtered ones.
 
     Raises:

@@ -164,7 +164,7 @@ class Diagnosis:
         standard: the field's standard model, which came first.
         experiment: what would separate the rivals, or an unproven effect from chance; None without either.
         held_out: names of the trials that the search chose by.
-        tested: names of those that nothing was fitted to or chosen by; without any, those that chose test too.
+        tested: names of the trials used for nothing else; without any, the held-out trials test too.
         known: effects of the model that it began with, NAME@JOINT.
         common: joint offsets that may be the encoder's or the initialisations'.
         left_out: excluded intervals, which follow no model.
@@ -249,7 +249,7 @@ def diagnose_recording(
 
     summaries, over_noise = tested_with(verdict.chosen)
     if over_noise["with_effects"] > over_noise["refitted"] and verdict.chosen.effects:
-        say(f"{verdict.chosen.label}: worse than without on the trials that test; not recommended")
+        say(f"{verdict.chosen.label}: worse than without it on the test trials; not recommended")
         verdict = Verdict("unknown_effect", findings.base)
         summaries, over_noise = tested_with(findings.base)
     fitted = simulations.final(verdict.chosen)

@@ -58,7 +58,7 @@ def disturbances(search: Search, recording: Recording, model: Model) -> list[Dis
 
     Args:
         search: cuts trials into segments and simulates them.
-        recording: every trial, of both parts and those that test.
+        recording: every trial: training, validation and test.
         model: fitted; joint offsets that it lacks are fitted here.
     """
     problem = Problem(search.shooting, search.windows(recording))

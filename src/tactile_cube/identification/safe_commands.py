@@ -71,7 +71,7 @@ class Limits:
 
     Attributes:
         largest: the limits themselves.
-        sources: position, speed, torque -> who says so, for each joint: `URDF`, `controller` or `trials`.
+        sources: position, speed, torque -> the source for each joint: `URDF`, `controller` or `trials`.
     """
 
     largest: Envelope
@@ -324,7 +324,7 @@ def interval_ends(fit: Fit) -> list[Model]:
     """Return the models with each number at either end of its 95 % interval, the others refitted to that.
 
     A number of one kind is at its end at all joints at once, so that a hand needs no more models than a joint.
-    One of which the data say nothing stays as fitted: it has no end that could be tried.
+    A number that is not identifiable stays as fitted: its interval has no ends.
     """
     covariance, unknowns = covariance_of_numbers(fit)
     misfit = max(1.0, fit.cost / max(int(np.count_nonzero(fit.residual)), 1))

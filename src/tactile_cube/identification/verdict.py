@@ -36,7 +36,7 @@ class Verdict:
     Attributes:
         kind: see issue and report.
         chosen: the recommended explanation; the base model where nothing is missing or known.
-        rivals: explanations that this data cannot tell from the chosen one.
+        rivals: explanations that this data cannot distinguish from the chosen one.
     """
 
     kind: Kind
@@ -102,7 +102,7 @@ class Unexplained:
 
     Attributes:
         joint: its name.
-        shapes: the missing torque over signals, most telling first.
+        shapes: the missing torque over signals, the best explained first.
         black_box: share of the rest that a black box could still explain beside the recommended model.
         explained: share of the torque missing beside the base model that the recommended model accounts for.
     """

@@ -208,7 +208,7 @@ def _warm_start(agent: Agent, path: Path, training: TrainingSettings) -> Trainin
     """Begin from the networks of a checkpoint, or from a policy file's actor; gives the schedule for it.
 
     A policy file holds the actor alone, which gradients of ignorant critics would lead astray (docs/match.md): it waits
-    until fresh ones know what it is worth.
+    until fresh ones have learned its value.
     """
     if path.suffix != POLICY_SUFFIX:
         state = load_checkpoint(path)

@@ -44,7 +44,7 @@ class Diagnosing:
     """Running diagnosis in a process of its own.
 
     Attributes:
-        said: everything that it said; `share`: how much of it is done, about; `best`: its best answer so far, in words.
+        said: all its lines; `share`: rough share that is done; `best`: its best answer so far, in words.
         found: its answer; None: it runs, was stopped or failed.
     """
 

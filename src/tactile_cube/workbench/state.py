@@ -1,6 +1,6 @@
 """What a workbench holds: a recording, a model that grows effect by effect, and its error after each step.
 
-Nothing here knows of a browser, and nothing is computed here that `compare`, `identify` and `diagnose` do not compute.
+It needs no browser, and computes only what `compare`, `identify` and `diagnose` compute.
 """
 
 from __future__ import annotations

@@ -51,7 +51,7 @@ class Grasp:
 
     Attributes:
         trial: what was measured.
-        spread: standard deviations of what nobody knows: joint offsets [rad] and the object's displacement [m].
+        spread: standard deviations of the unknown joint offsets [rad] and of the object's displacement [m].
         free: which of these numbers are fitted: those of fingers that take part.
     """
 

@@ -119,7 +119,7 @@ class Drift:
             without a clock, a repeat [rad].
         clock: whether time stamps go on from trial to trial.
         tracking: whether it is the error of tracking.
-        repeats: how many tell it.
+        repeats: number of repeats that show it.
     """
 
     joint: str
