@@ -1,1 +1,1 @@
-"""What measures this project; nothing here is needed to use it."""
+"""Benchmarks of this project; nothing here is needed to use it."""

@@ -47,7 +47,7 @@ MOVE = """async (moves) => {
 
 @contextmanager
 def workbench(*words: str, width: int = 1280) -> Iterator[tuple[Page, psutil.Process, Path]]:
-    """A workbench in Chromium: its page, its server, the folder of its run."""
+    """Open a workbench in Chromium; yield its page, its server and the folder of its run."""
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=shutil.which("chromium"), args=ARGUMENTS)
         command = [sys.executable, "-m", "tactile_cube.workbench", "open=false", f"hydra.run.dir={folder}", *words]
@@ -66,7 +66,7 @@ def workbench(*words: str, width: int = 1280) -> Iterator[tuple[Page, psutil.Pro
 
 
 def processor_seconds(server: psutil.Process) -> float:
-    """Of the server and the diagnoses that it started; those that have ended count by their parent."""
+    """Return the processor time of the server and of the diagnoses that it started [s], ended ones included."""
     running = sum(sum(one.cpu_times()[:2]) for one in server.children(recursive=True))
     return float(sum(server.cpu_times()[:4]) + running)
 

@@ -14,7 +14,7 @@ def lines(files: Iterable[Path]) -> int:
 
 
 def sizes(root: Path) -> dict[str, int]:
-    """What there is of what in a checkout."""
+    """Return the sizes of a checkout, by kind."""
     package, pages = list((root / "src").rglob("*.py")), list((root / "docs").rglob("*.md"))
     results = [file for file in (root / "docs" / "results").rglob("*") if file.is_file() and file.suffix != ".md"]
     return {

@@ -1,4 +1,4 @@
-"""What touch can know: regress the state of the world on what the policy reads; R^2 on held-out episodes, as a table.
+"""Regress the state of the world on the policy's readings: R^2 on held-out episodes, as a table.
 
 python -m benchmarks.touch                                    # every shipped policy, in wide worlds; five CPU minutes
 python -m benchmarks.touch --policies default --episodes 24

@@ -54,33 +54,33 @@ def _csv(columns: dict[str, np.ndarray], start: str, names: tuple[str, ...]) -> 
 
 
 class Walk:
-    """Somebody at the page, whose clicks and keys are counted."""
+    """User of the page, whose clicks and keys are counted."""
 
     def __init__(self, page: Page, out: Path | None = None) -> None:
         self.page, self.out, self.actions = page, out, 0
 
     def drop(self, logs: Logs) -> None:
-        """Files onto the page."""
+        """Drop files onto the page."""
         self.page.dispatch_event("body", "drop", {"dataTransfer": self.page.evaluate_handle(DROP, logs)})
         self.actions += 1
 
     def click(self, name: str) -> None:
-        """A button."""
+        """Click a button."""
         self.page.get_by_role("button", name=name, exact=True).click()
         self.actions += 1
 
     def choose(self, label: str, option: str) -> None:
-        """A value of a select."""
+        """Choose a value of a select."""
         self.page.get_by_label(label, exact=True).select_option(option)
         self.actions += 2
 
     def type(self, label: str, text: str) -> None:
-        """A text into a field."""
+        """Type a text into a field."""
         self.page.get_by_label(label).fill(text)
         self.actions += 1 + len(text)
 
     def picture(self, name: str, height: float, heading: str = "", half: bool = False) -> None:
-        """The window from a heading on, or the right half of it, in few colours."""
+        """Save a picture of the window from a heading on, or of its right half, in few colours."""
         if self.out is None:
             return
         self.page.wait_for_timeout(3000)

@@ -1,1 +1,1 @@
-"""Faults at random moments: what a training run, a file and a long life survive."""
+"""Fault injection: training runs, damaged files, attacks on the control loop, and growth over long runs."""

@@ -1,4 +1,4 @@
-"""A hand in real time whose joints get blocked and whose calls fail when it is told so, behind the command `deploy`."""
+"""A hand in real time, for the command `deploy`, whose joints get blocked and whose calls fail on demand."""
 
 import math
 import os
@@ -89,7 +89,7 @@ class BlockedHand:
         """Nobody holds an object."""
 
     def close(self) -> None:
-        """Leave a note."""
+        """Note that the hand was closed."""
         self._state["closed"] = 1
 
     def _fail(self, way: str) -> None:

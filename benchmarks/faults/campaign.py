@@ -34,7 +34,7 @@ from tactile_cube.training.checkpoint import BEFORE, FILE, Checkpoints, load_che
 
 @dataclass(frozen=True)
 class Phase:
-    """A part of a run: how it is told that it has begun, and how long it lasts [s]."""
+    """Part of a run: how its beginning is detected, and how long it lasts [s]."""
 
     begun: Callable[[Command], bool]
     seconds: float
@@ -165,7 +165,7 @@ TIMES = ("simulating_hours", "learning_hours", "wall_hours")
 
 @dataclass
 class Outcome:
-    """What a fault did.
+    """Outcome of a fault.
 
     Attributes:
         kind: of fault.
@@ -191,7 +191,7 @@ class Outcome:
 
 
 def undisturbed(folder: Path, settings: Sequence[str]) -> tuple[dict[str, Any], float]:
-    """What the command gives without a fault, and how long it takes [s]."""
+    """Return the results of the command without a fault, and how long it takes [s]."""
     be_ready()
     command = Command(folder, tuple(settings))
     began = time.monotonic()
@@ -202,7 +202,7 @@ def undisturbed(folder: Path, settings: Sequence[str]) -> tuple[dict[str, Any], 
 
 
 def strike(kind: Kind, folder: Path, moment: float, settings: Sequence[str], reference: dict[str, Any]) -> Outcome:
-    """One fault and what comes of it."""
+    """Inject one fault and return its outcome."""
     command = Command(folder, tuple(settings), rows=len(reference["rows"]))
     command.start()
     while kind.phase is not None and not command.ended and not kind.phase.begun(command):
@@ -236,7 +236,7 @@ def results(folder: Path) -> dict[str, Any]:
 
 
 def same(a: Any, b: Any) -> bool:
-    """Whether two trees of tensors and plain values are equal bit for bit."""
+    """Return whether two trees of tensors and plain values are equal bit for bit."""
     if isinstance(a, torch.Tensor):
         return torch.equal(a, b)
     if isinstance(a, dict):
@@ -282,7 +282,7 @@ def table(outcomes: Sequence[Outcome], seconds: float) -> str:
 def campaign(
     faults: int, seed: int, out: Path | None, settings: Sequence[str] = SHORT, kinds: Sequence[Kind] = KINDS
 ) -> list[Outcome]:
-    """Strike with all kinds in turn, at moments spread over the run or its phase; write the table after each."""
+    """Inject all kinds of faults in turn, at moments spread over the run or its phase; write the table after each."""
     moments = random.Random(seed)
     outcomes: list[Outcome] = []
     with tempfile.TemporaryDirectory() as place:

@@ -1,4 +1,4 @@
-"""A training command in a process of its own, and what is left of it."""
+"""Training command in a process of its own, and the processes that it leaves."""
 
 import ctypes
 import multiprocessing
@@ -48,13 +48,13 @@ class Command:
 
     @property
     def pid(self) -> int:
-        """Of its main process."""
+        """Process id of its main process."""
         assert self.process.pid is not None
         return self.process.pid
 
     @property
     def ended(self) -> bool:
-        """Whether its main process has."""
+        """Whether its main process has ended."""
         return self.process.exitcode is not None
 
     @property
@@ -75,7 +75,7 @@ class Command:
         return [process for process in self.processes() if process.pid != self.pid]
 
     def processes(self) -> list[psutil.Process]:
-        """All that runs of it: the processes of its session."""
+        """Running processes of its session."""
         found = []
         for process in psutil.process_iter():
             try:
@@ -86,7 +86,7 @@ class Command:
         return found
 
     def orphans(self, seconds: float = 5.0) -> int:
-        """Processes still there so long after the end; they are killed."""
+        """Kill the processes that still run so long after the end; return their number."""
         deadline = time.monotonic() + seconds
         while (left := self.processes()) and time.monotonic() < deadline:
             time.sleep(0.2)

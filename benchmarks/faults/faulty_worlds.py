@@ -19,7 +19,7 @@ WISH = "TACTILE_CUBE_TEST_WISH"
 
 
 class Wish(Transform):  # type: ignore[misc]
-    """Grants the wish in the file and deletes it."""
+    """Causes the fault that the file asks for, and deletes the file."""
 
     def __init__(self, path: Path):
         super().__init__()

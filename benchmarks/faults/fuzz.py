@@ -40,7 +40,7 @@ class Hung(BaseException):
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a damaged file.
+    """Outcome of reading a damaged file.
 
     Attributes:
         kind: "read", "refused", "traceback", "hung" or "left".

@@ -1,4 +1,4 @@
-"""What reads files of strangers: a sound example of each kind, and the reader that a command uses."""
+"""Readers of untrusted files: a sound example of each kind, and the reader that a command uses."""
 
 import hashlib
 import json
@@ -202,7 +202,7 @@ def _read_urdf(folder: Path) -> None:
 
 
 def model() -> ModelFile:
-    """A model of a finger, with an effect of the drivetrain and one of the object."""
+    """Return a model of a finger, with an effect of the drivetrain and one of the object."""
     interval = Estimate(value=0.24, low=0.23, high=0.25, unit="N m s/rad")
     play = Estimate(value=1e-3, low=5e-4, high=2e-3, unit="rad")
     return ModelFile(

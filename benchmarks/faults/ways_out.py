@@ -45,7 +45,7 @@ SETTINGS = ("seconds=20", "homing.speed=2", "homing.settle=0.1", "stop.lateness=
 
 @dataclass
 class Outcome:
-    """What an attack did.
+    """Outcome of an attack.
 
     Attributes:
         pressed: spring torque of the command when it struck, and `left` of the last one [N m].
@@ -69,7 +69,7 @@ class Outcome:
 
 
 def strike(way: str, phase: str, moment: float, place: Path) -> Outcome:
-    """One attack on one process."""
+    """Attack one process and return the outcome."""
     place.mkdir()
     shared(place / "state", "w+").flush()
     state = shared(place / "state")[0]

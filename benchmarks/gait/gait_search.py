@@ -33,7 +33,7 @@ BOUNDS = {
 
 @dataclass(frozen=True)
 class Trial:
-    """How a gait did.
+    """Performance of a gait.
 
     Attributes:
         gait: what was tried.
@@ -53,7 +53,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class Found:
-    """What a search found.
+    """Result of a search.
 
     Attributes:
         best: the gait with the best score when tried again in fresh episodes.

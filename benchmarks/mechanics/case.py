@@ -14,7 +14,7 @@ from tactile_cube.simulation.world import World
 
 @dataclass(frozen=True)
 class Answer:
-    """What came of a case.
+    """Result of a case.
 
     Attributes:
         quantity: What is measured, in words.
@@ -47,7 +47,7 @@ _TIMED = 50
 
 @dataclass(frozen=True)
 class Setting:
-    """What came of one engine at one accuracy.
+    """Results of one engine at one accuracy setting.
 
     Attributes:
         name: Engine and accuracy, e.g. `mujoco fast`.

@@ -1,4 +1,4 @@
-"""What numerical choices cost and buy: speed, and the deviation of a held and a twisted cube from convergence."""
+"""Speed and accuracy of numerical options: deviation of a held and a twisted cube from convergence."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _HOLD_STEPS, _TWIST_STEPS, _REST_STEPS = 100, 30, 20
 
 @dataclass(frozen=True)
 class Accuracy:
-    """What one set of options gives.
+    """Speed and accuracy of one set of options.
 
     Attributes:
         creep: Way of a held cube from 5 s to 10 s [m].

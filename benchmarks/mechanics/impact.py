@@ -19,7 +19,7 @@ from tactile_cube.simulation.world import World
 Array = NDArray[np.float64]
 
 SPEED = 0.2
-"""Of the fingertip along the normal [m/s]."""
+"""Speed of the fingertip along the normal [m/s]."""
 MASS, SIZE = 0.05, 0.08
 FINGER = 2
 _GAP, _AWAY = 1e-3, 2e-2

@@ -18,11 +18,11 @@ Array = NDArray[np.float64]
 SIZE = 0.08
 """Edge of the box [m]."""
 GRAVITY = 9.81
-"""[m/s^2]."""
+"""Gravity [m/s^2]."""
 CLOSING = 2.0
 """Time without weight, in which the tips close and forces settle [s]."""
 STIFFNESS = 30.0
-"""Of the joints [N m/rad], ten times the hand's: tips that move little while they close leave the box upright."""
+"""Stiffness of the joints [N m/rad], ten times the hand's: tips that hardly move in closing leave the box upright."""
 _RIGID = 1e4
 _NEVER = 10**6
 _CLEARANCE, _RETRACTED = 1e-3, 2e-2

@@ -24,7 +24,7 @@ GAIT_STEPS = 60
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of the motions.
+    """Results of the motions.
 
     Attributes:
         rest: Where the held cube is after 10 s (3,) [m].

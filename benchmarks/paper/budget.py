@@ -1,4 +1,4 @@
-"""What a gait earns and pays a radian under the published reward, in other worlds and by other readings of the text.
+"""Reward terms per radian of a gait under the published reward, in other worlds and by other readings of the text.
 
 python -m benchmarks.paper.budget  # docs/results/data/paper_budget.json, and the table on the screen
 """
@@ -44,7 +44,7 @@ WORLDS: dict[str, dict[str, Any]] = {
 
 
 def budget(policy: str, world: str, episodes: int, seconds: float) -> dict[str, Any]:
-    """What a policy earns and pays in a world, the mean over its episodes.
+    """Return the reward terms of a policy in a world, the mean over its episodes.
 
     Returns:
         "turned" [rad], "return", the weighted terms by name, "first" (their sum in the first second), and "path": plane
@@ -86,7 +86,7 @@ def read_budget() -> list[dict[str, Any]]:
 
 
 def table(rows: list[dict[str, Any]]) -> str:
-    """The rows as Markdown: what comes in and goes out in 10 s, and what a radian earns and pays."""
+    """Return the rows as Markdown: reward terms of 10 s, and per radian."""
     head = "| policy | world | rad | return | q1 | first second | a radian: spin | tilt | plane | height |"
     lines = [head, "|---" * head.count(" |") + "|"]
     for row in rows:

@@ -1,4 +1,4 @@
-"""Answers to recordings that are known: what a change of the search has made better or worse.
+"""Diagnose known recordings again: what a change of the search has made better or worse.
 
     python -m benchmarks.regression --out outputs/regression --keep tests/identification/evidence.json.gz
 
@@ -37,7 +37,7 @@ def draws() -> list[dict[str, Any]]:
 
 
 def judged(draw: dict[str, Any], folder: Path) -> dict[str, Any]:
-    """One recording made, diagnosed as a user does, and judged."""
+    """Make one recording, diagnose it as a user does, and judge the answer."""
     words = {key: value for key, value in draw.items() if key != "expects"}
     truth = write(out=folder, **words)
     progress: list[str] = []

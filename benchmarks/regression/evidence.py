@@ -1,4 +1,4 @@
-"""What held-out trials said of every set that a search judged, kept so that other criteria may decide by it."""
+"""Held-out statistics of every set that a search judged, kept so that other criteria may be tried on them."""
 
 from __future__ import annotations
 

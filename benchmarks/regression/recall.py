@@ -1,4 +1,4 @@
-"""How often a search judged the set of effects that is hidden: the recall of its proposals.
+"""Recall of a search's proposals: how often the hidden set of effects was among the sets that it judged.
 
     python -m benchmarks.regression.recall docs/results/data/rounds/sealed_1300000.jsonl.gz
 

@@ -1,1 +1,1 @@
-"""How fast it is: the same work given to this package and to its peers, in turns, in one run."""
+"""Speed: the same work given to this package and to its peers, in turns, in one run."""

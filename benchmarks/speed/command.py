@@ -1,4 +1,4 @@
-"""What a command takes, from start to end, as a user types it."""
+"""Time and memory of a command, from start to end, as a user types it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ TIMEOUT = 300.0
 
 @dataclass(frozen=True)
 class Watched:
-    """What a command took.
+    """Time and memory of a command.
 
     Attributes:
         wall: time on the clock [s].

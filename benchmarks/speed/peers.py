@@ -1,4 +1,4 @@
-"""Other people's programs, which need not be there."""
+"""Optional peers: other people's programs."""
 
 from __future__ import annotations
 

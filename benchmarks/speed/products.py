@@ -1,4 +1,4 @@
-"""The matrix products of one update and nothing else: what no implementation on this machine goes below."""
+"""The matrix products of one update and nothing else: a lower bound for every implementation on this machine."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ ROWS = 20_000
 
 
 class Nothing(gymnasium.Env[Any, Any]):
-    """Spaces without a world behind them."""
+    """Environment with spaces only."""
 
     def __init__(self, observation: int, action: int) -> None:
         """Takes the widths."""

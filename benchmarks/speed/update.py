@@ -63,7 +63,7 @@ def update(rounds: int, peers: bool = True, calls: int = CALLS, hidden: int = 51
 
 
 def _parts(hidden: int) -> dict[str, Callable[[], object]]:
-    """What an update cannot do without, and what no implementation goes below."""
+    """Indispensable parts of an update: a lower bound for every implementation."""
     replay, weights = filled_replay(20_000), torch.ones(REWARD_TERMS)
     shapes = update_products(SIZES, 256, hidden)
     return {

@@ -173,7 +173,7 @@ def workbench(job: Job) -> None:
 
 
 def compare_trainings(folders: list[Path]) -> None:
-    """Say what came of the runs of a sweep."""
+    """Summarise the runs of a sweep."""
     from tactile_cube.evaluation.training_curve import read_sweep, sweep_table
     from tactile_cube.visualization.charts import write_sweep_curves
 

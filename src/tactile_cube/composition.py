@@ -1,4 +1,4 @@
-"""The configuration in conf/: what `--help` says of it, composed as a command line would, names that are nearly right.
+"""The configuration in conf/: its help texts, its composition, and suggestions for misspelt names.
 
 Nothing is imported to answer `--help`.
 """
@@ -19,7 +19,7 @@ from tactile_cube.errors import InputError
 CONFIG = Path(__file__).parent / "conf"  # the configuration tree; in a checkout a link to conf/ at the top
 
 ADDED = ("experiment", "without")
-"""Groups of training that no default chooses from: `+experiment=option`, and `without=option` beside ablations."""
+"""Groups of training without a default: `+experiment=option`, and `without=option` beside ablations."""
 
 RECIPE = {"train": "curriculum"}  # the experiment that a command takes where the command line names none
 
@@ -41,7 +41,7 @@ def help_text(name: str) -> str:
 
 
 def commands() -> dict[str, str]:
-    """Return commands of the package and the first line of what they say about themselves, without importing them."""
+    """Return command -> first line of its description, without importing the commands."""
     table = ast.parse((Path(__file__).parent / "commands.py").read_text(encoding="utf-8"))
     said = {part.name: ast.get_docstring(part) or "" for part in table.body if isinstance(part, ast.FunctionDef)}
     return {name: said[name].partition("\n")[0] for name in sorted(path.stem for path in CONFIG.glob("*.yaml"))}
@@ -138,7 +138,7 @@ def with_recipe(name: str, words: list[str]) -> list[str]:
     return [*words[:first], f"+experiment={RECIPE[name]}", *words[first:]]
 
 
-SHORTEST = 5  # letters of the beginning of a name that tell it
+SHORTEST = 5  # letters from which on the beginning of a name identifies it
 
 
 def suggestion(word: str, known: Iterable[str], prefix: str = "") -> str:

@@ -1,4 +1,4 @@
-"""The one error that a user's input can cause, and what is said of input that is odd but can be used."""
+"""The error for input that cannot be used, and warnings about input that is odd but can be."""
 
 import sys
 
@@ -12,6 +12,6 @@ class InputError(ValueError):
 
 
 def warn(line: str) -> None:
-    """Say what is odd or in doubt, in yellow on a terminal."""
+    """Print a warning, in yellow on a terminal."""
     yellow, plain = ("\x1b[33m", "\x1b[0m") if sys.stderr.isatty() else ("", "")
     print(f"{yellow}warning: {line}{plain}", file=sys.stderr)

@@ -1,4 +1,4 @@
-"""The same environment, transforms included, for learners that speak Gymnasium."""
+"""The training environment, transforms included, with Gymnasium's interface."""
 
 from collections.abc import Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""What a file may ask for at most: beyond it a file is damaged, or takes the memory or time of whoever opens it."""
+"""Size limits of files: larger ones are damaged, or would take too much memory or time."""
 
 TEXT = 2_000_000  # bytes of YAML or URDF: a recording of 10 000 trials has 1 MB, a humanoid's URDF 0.2 MB
 VALUES = 200_000

@@ -57,7 +57,7 @@ _STYLE = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 
 
 class KeptStream:
-    """A stream whose lines also go to a file, without colours; of a line shown in place, every state is one.
+    """Stream whose lines also go to a file, without colours; each state of a line shown in place is a line there.
 
     Args:
         stream: shown.

@@ -18,7 +18,7 @@ LONGEST = 180  # characters of a folder's name that stand for overrides; file sy
 
 
 class SweepFolder(Callback):
-    """Tells the process that begins a sweep its folder; Hydra calls it, see conf/hydra/default.yaml."""
+    """Hydra callback that keeps a sweep's folder for the process that begins it, see conf/hydra/default.yaml."""
 
     path: ClassVar[Path | None] = None
 

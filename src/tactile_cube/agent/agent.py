@@ -1,4 +1,4 @@
-"""What training asks of an agent, soft actor-critic with whichever loss, and the numbers of the algorithm."""
+"""Base class of the agents, soft actor-critic with any loss, and the hyperparameters."""
 
 import copy
 from abc import ABC, abstractmethod
@@ -21,7 +21,7 @@ def multiplies_bfloat16() -> bool:
 
 
 class AgentSettings(BaseModel):
-    """Hyperparameters of SAC, as the paper publishes them where it does; conf/agent/plain_sac.yaml explains each.
+    """Hyperparameters of SAC, the paper's where it states them; conf/agent/plain_sac.yaml explains each.
 
     Imitation (`demonstration_weight`) is behaviour cloning with a Q filter, Nair et al. 2018. Collection stays on the
     CPU whatever the `device` ("cpu", "cuda" or "cuda:0"). Source: website table of the paper.
@@ -56,7 +56,7 @@ class AgentSettings(BaseModel):
 
     @property
     def product_dtype(self) -> torch.dtype:
-        """What matrices are multiplied in: float32 or bfloat16."""
+        """Data type of matrix products: float32 or bfloat16."""
         if self.precision == "auto":
             return torch.bfloat16 if self.device != "cpu" or multiplies_bfloat16() else torch.float32
         return torch.bfloat16 if self.precision == "bf16" else torch.float32

@@ -46,7 +46,7 @@ Layer = tuple[Array, Array]
 
 
 class PolicyInfo(BaseModel):
-    """Where a policy comes from and what it expects.
+    """Metadata of a policy: its origin, and the environment that it expects.
 
     Attributes:
         observation_size: width of the stacked observation.
@@ -153,7 +153,7 @@ def require_sizes(path: Path | str, info: PolicyInfo, observation_size: int, act
 
 
 def current_commit() -> str:
-    """Return commit of the checkout this code runs from, "-dirty" appended when it was changed; "unknown" elsewhere."""
+    """Return the commit of this code's checkout, "-dirty" appended when it was changed; "unknown" elsewhere."""
     command = ["git", "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"]
     try:
         run = subprocess.run(command, cwd=Path(__file__).parent, capture_output=True, text=True, timeout=5, check=True)

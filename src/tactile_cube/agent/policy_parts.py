@@ -1,4 +1,4 @@
-"""What a policy's file may ask for: the parts of an environment, from a list, described by plain data.
+"""Check of the environment stated in a policy file: plain data that names listed classes only.
 
 The file may come from anywhere, and Hydra makes whatever a configuration names. So all that any command has made of it
 passes `require_parts` first. It names no class that is not in `PARTS`, gives Hydra no other instruction, refers to
@@ -28,10 +28,10 @@ PARTS = {
     "tactile_cube.randomization": ("GraspStarts", "Randomization", "StartStates", *DISTRIBUTIONS),
     "tactile_cube.simulation": ("EpisodeConstants", "SimulationOptions", "constants_of"),
 }
-"""Package -> the classes, and functions of plain numbers, that are made for a policy's file."""
+"""Package -> the classes, and functions of plain numbers, that a policy file may name."""
 KINDS = {"bool": (bool,), "float": (float, int), "int": (int,), "str": (str,), "None": (type(None),)}
 MOST = 50_000
-"""Values in a configuration; one with an identified model of twelve joints has ten thousand."""
+"""Maximum number of values in a configuration; one with an identified model of twelve joints has ten thousand."""
 Part = dict[str, Any]
 
 
@@ -45,7 +45,7 @@ class _Environment(BaseModel):
     reward: Part | None = None
     randomization: Part | None = None
     start: Part | None = None
-    exploration: Any = Field(default=None, exclude=True)  # of the training alone
+    exploration: Any = Field(default=None, exclude=True)  # used in training only
     curriculum: Any = Field(default=None, exclude=True)
     constants: Part | None = None
     simulation: Part | None = None
@@ -57,7 +57,7 @@ class _Environment(BaseModel):
 
 
 def require_parts(env: Any, label: str, replaced: Collection[str] = ()) -> dict[str, Any]:
-    """Return the part `env` of a policy's configuration, of which an environment can be made.
+    """Return the part `env` of a policy's configuration, checked, so that an environment can be built from it.
 
     Args:
         env: as the file has it.
@@ -82,12 +82,12 @@ def require_parts(env: Any, label: str, replaced: Collection[str] = ()) -> dict[
 
 @contextmanager
 def making(label: str) -> Iterator[None]:
-    """Say in one line what cannot be made of a policy's configuration, however Python or Hydra says so."""
+    """Raise any error in building from a policy's configuration as an `InputError` of one line."""
     try:
         yield
     except InputError:
         raise
-    except Exception as error:  # of any kind: the values are a stranger's
+    except Exception as error:  # any kind of error: the values are untrusted
         if isinstance(error.__cause__, InputError):
             raise error.__cause__ from None
         raise InputError(f"{label}: its configuration cannot be used: {' '.join(str(error).split())}") from error
@@ -122,8 +122,8 @@ def _entry(key: str, value: Any, place: str, label: str) -> Any:
     if str(value) not in shipped:
         group = "hand" if key == "urdf" else "object" if ".object" in place else "start"
         raise InputError(
-            f"{label}: {place} is {str(value)[:60]!r}, a file that is none of the package's, and a policy has "
-            f"no other read; name it yourself: {group}=..., with the options that it was trained with"
+            f"{label}: {place} is {str(value)[:60]!r}, a file that is none of the package's; a policy file "
+            f"may name no other; choose it yourself: {group}=..., with the options that it was trained with"
         )
     return shipped[str(value)]
 

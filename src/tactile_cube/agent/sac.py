@@ -83,7 +83,7 @@ class Sac(Agent):
         state = {"observation": torch.zeros(2, sizes.observation), "privileged": torch.zeros(2, sizes.privileged)}
         chosen = {"action": torch.zeros(2, sizes.action), "steps_to_next_obs": one}
         following = state | {"reward": one, "done": no, "terminated": no}
-        with torch.random.fork_rng():  # training draws what it drew without this
+        with torch.random.fork_rng():  # training's random numbers stay the same
             losses = self.losses(TensorDict(state | chosen | {"next": following}, [2], device=self.device))
         losses.select("loss_qvalue", "loss_actor", "loss_alpha", "alpha")
 

@@ -1,1 +1,1 @@
-"""The functions of the package, one for nearly each command; the commands are thin over them."""
+"""Functions of the package, one for nearly every command; the commands call them."""

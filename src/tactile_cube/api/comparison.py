@@ -76,7 +76,7 @@ def _imported(job: Job, out: Path) -> dict[str, Recording]:
 
 @dataclass(frozen=True)
 class ComparisonResult:
-    """How far a model and a measurement are apart, and where; `comparison` has errors by joint, trial and regime."""
+    """Deviation of a model from a measurement; `comparison` has errors by joint, trial and regime."""
 
     comparison: Comparison
     job: Job
@@ -89,12 +89,12 @@ class ComparisonResult:
 
     @property
     def noise_floor(self) -> float:
-        """What a perfect model would leave of it [rad]."""
+        """Error that a perfect model would leave [rad]."""
         return self.comparison.floor.overall
 
     @property
     def text(self) -> str:
-        """The answer, a line a joint, and where it fails, in words."""
+        """The result in words: overall, by joint, and where the model fails."""
         from tactile_cube.visualization.comparison_report import summary
 
         return summary(self.comparison)
@@ -156,7 +156,7 @@ def compare(
 
 
 class BandSettings(Strict):
-    """How many randomised simulations make the band, and how far their constants spread."""
+    """Band of randomised simulations: their number, and how far their constants spread."""
 
     simulations: Annotated[int, Field(ge=0)]
     spread: dict[str, NotNegative]
@@ -165,7 +165,7 @@ class BandSettings(Strict):
 def run_comparison(
     job: Job, recording: Recording | PathLike, model: ModelFile | PathLike | None, say: Say | None = None
 ) -> ComparisonResult:
-    """Compare as a job says: free motion, or grasps where there is nothing else."""
+    """Run a comparison: on free motion, or on grasps if the recording has nothing else."""
     config, say = job.config, say or job.say
     model, recording = _at_gain(modelled(model), config.gain), opened(recording)
     held = len(with_object(recording).trials)

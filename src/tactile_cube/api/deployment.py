@@ -50,7 +50,7 @@ def export(
     object: str | None = None,
     values: Mapping[str, Any] | None = None,
 ) -> Path:
-    """Write a policy as plain arrays (.npz) or ONNX (.onnx), with the contract it is to be run by beside it.
+    """Write a policy as plain arrays (.npz) or ONNX (.onnx), with its interface contract beside it.
 
     Args:
         policy: as in `load_policy`.
@@ -69,7 +69,7 @@ def export(
 
 
 def run_export(job: Job) -> tuple[Path, Path]:
-    """Write the files of a job; gives the network's and the contract's."""
+    """Write the files of an export; return the paths of the network and of the contract."""
     config, source = job.config, policy_path(job.config.policy)
     output = Path(config.output or f"{source.stem}.npz")
     network = load_policy(source)
@@ -85,8 +85,8 @@ def _setting(config: Any, network: Network, trained: bool = True) -> TrainingSet
     if hand is None and setting.hand.drive and config.get("robot", {}).get("_target_") != SIMULATED:
         name = setting.hand.name
         raise InputError(
-            f"{network.label}: what the drives of hand '{name}' bear, and so the limits of every command, would come "
-            f"from the policy's file alone; name the hand: hand={name}"
+            f"{network.label}: what the drives of hand '{name}' bear, which limits every command, would be known from "
+            f"the policy's file alone; name the hand: hand={name}"
         )
     return setting
 
@@ -96,7 +96,7 @@ SIMULATED = f"{SimulatedHand.__module__}.{SimulatedHand.__qualname__}"
 
 @dataclass(frozen=True)
 class DeploymentResult:
-    """What came of the control loop.
+    """Result of the control loop.
 
     Attributes:
         runs: how each run ended and its tick times.
@@ -123,7 +123,7 @@ class DeploymentResult:
 
     @property
     def rate(self) -> float:
-        """Of the fast loop [Hz]."""
+        """Rate of the fast loop [Hz]."""
         return float(self.job.config.robot.rate)
 
     def write(self, folder: PathLike) -> Path | None:
@@ -176,7 +176,7 @@ def deploy(
 
 
 def run_deployment(job: Job, say: Say, folder: Path | None = None) -> DeploymentResult:
-    """Go home, run and stop, as often as the job says; every run has a new loop.
+    """Home, run and stop as often as the job says; every run has a new loop.
 
     Args:
         job: what to do.

@@ -31,7 +31,7 @@ SHAPES = 3  # of the missing torque of one joint, best fit first
 
 @dataclass(frozen=True)
 class DiagnosisResult:
-    """The answer, what supports it, and the model with the effects that were found.
+    """Verdict, its evidence, and the model with the effects that were found.
 
     Attributes:
         known: the model that it began with; None: what the recording states.

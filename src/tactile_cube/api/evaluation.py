@@ -24,7 +24,7 @@ from tactile_cube.visualization.rerun_recording import VIEWERS, show_files
 
 @dataclass(frozen=True)
 class EvaluationResult:
-    """What came of a protocol: of each condition in `variants`, the protocol's first one first."""
+    """Result of a protocol, for each of its conditions in `variants`, in the protocol's order."""
 
     run: EvaluationRun
     variants: list[VariantResult]
@@ -37,11 +37,11 @@ class EvaluationResult:
 
     @property
     def text(self) -> str:
-        """What came of each condition, in words."""
+        """Result of each condition, in words."""
         return "\n".join(one.text for one in self.variants)
 
     def episode(self, number: int, variant: int = 0) -> EpisodeRecord:
-        """Run an episode again, equal to the bit, and return every signal of it."""
+        """Run an episode again, bit for bit, and return all its signals."""
         chosen = self.variants[variant]
         return self.evaluation.record(chosen.variant, chosen.results[number])
 
@@ -127,7 +127,7 @@ def run_evaluation(job: Job, say: Say) -> EvaluationResult:
 
 @dataclass(frozen=True)
 class ViewResult:
-    """What there is to see, and where.
+    """Rerun recordings of a run, and where they are shown.
 
     Attributes:
         files: Rerun recordings.
@@ -141,7 +141,7 @@ class ViewResult:
 
     @property
     def text(self) -> str:
-        """The answer of the command."""
+        """Output of the command."""
         lines = [f"{name}: {_described(result)}" for name, result in self.episodes.items()]
         return "\n".join([*lines, *(f"recording: {file}" for file in self.files), self.opened])
 
@@ -182,7 +182,7 @@ def view(
 
 
 def run_view(job: Job, say: Say) -> ViewResult:
-    """See what a job names."""
+    """Write or find the recordings that a job names, and show them."""
     config, run = job.config, Path(job.config.run)
     if config.viewer not in VIEWERS:
         raise InputError(f"viewer={config.viewer}: choose one of {', '.join(VIEWERS)}")

@@ -23,13 +23,13 @@ from tactile_cube.whole_file import write_json, written_together
 
 @dataclass(frozen=True)
 class MonitorResult:
-    """What has changed.
+    """Changes of a machine since its model was identified.
 
     Attributes:
         before: the reference model.
         refitted: the same effects fitted to the newest recording.
-        drifts: every number that both know, the least probable difference first.
-        changed: those that are no chance, where the held-out trials speak against the numbers as they were.
+        drifts: every parameter of both models, the least probable difference first.
+        changed: the significant ones, if the held-out trials reject the old values.
         errors: held-out error over the sensor noise: `before`, of the reference on its own recording; `as_before`, of
             the reference on the newest; `now`, of the refitted model there.
         missing: whether the refitted model has become so much worse that something new is missing.
@@ -135,7 +135,7 @@ def monitor(
 def run_monitor(
     job: Job, recording: Recording | PathLike, model: ModelFile | PathLike, say: Say | None = None
 ) -> MonitorResult:
-    """Refit the reference's effects on the newest recording, and hold the numbers and the errors side by side.
+    """Refit the reference's effects on the newest recording, and compare parameters and errors.
 
     Numbers that trade places with each other differ from recording to recording by more than their intervals say; a
     machine that has changed is not followed any more by the numbers as they were.

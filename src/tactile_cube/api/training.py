@@ -37,11 +37,11 @@ PUBLISHED: dict[str, dict[str, Any]] = {
 }
 """Hand and object of the paper, by the groups of conf/."""
 KEY = re.compile(r"[+~]*([\w./@]+)")  # key that an override sets
-NOT_A_STAGES = re.compile(r"(experiment|stages|judgement|name)\b")  # keys of the training as a whole
+NOT_A_STAGES = re.compile(r"(experiment|stages|judgement|name)\b")  # keys of the whole training, not of a stage
 ENGINES = ("bullet", "mujoco")
 GRASPS = 1000  # as many as those that come with the package
 COUNTED = ("steps", "updates", "episodes", "wall_hours", "simulating_hours", "learning_hours")
-"""Columns of metrics.csv that go on from stage to stage."""
+"""Columns of metrics.csv that continue from stage to stage."""
 
 
 @dataclass(frozen=True)
@@ -140,7 +140,7 @@ def average(run: PathLike, *, last: int | None = None, output: PathLike | None =
 
 
 def run_averaging(job: Job) -> AveragedPolicy:
-    """Write the policy of a job."""
+    """Average the policies that a job names, and write the result."""
     run = Path(job.config.run)
     actor, info = averaged(kept_policies(run, job.config.last))
     output = Path(job.config.output or run / "policy_averaged.safetensors")
@@ -149,7 +149,7 @@ def run_averaging(job: Job) -> AveragedPolicy:
 
 
 def run_training(job: Job, stage: str = "", later: int = 0) -> TrainingResult:
-    """Train what a job says, in one run or in stages, and say how it went.
+    """Run a training job, in one run or in stages, and return its result.
 
     Of a stage of several, `stage` is what lines of progress begin with, and the stages after it usually take `later`
     environment steps.
@@ -164,7 +164,7 @@ def run_training(job: Job, stage: str = "", later: int = 0) -> TrainingResult:
 
 def _in_one(job: Job, plain: dict[str, Any], stage: str, later: int) -> TrainingResult:
     start = partial(_training_run, job, plain, stage, later)
-    run, reason = train_on(start, partial(start, resume="auto"))  # what starts over does so once
+    run, reason = train_on(start, partial(start, resume="auto"))  # later starts resume
     return TrainingResult(job.folder, reason, run.learner.steps, float(run.learner.episodes.mean_angle))
 
 
@@ -215,7 +215,7 @@ def stages_of(job: Job) -> list[Job]:
     chosen = {_key(word) for word in own}
     jobs: list[Job] = []
     for name, words in job.config.stages.items():
-        fitting = [word for word in words if _key(word).partition(".")[0] not in chosen]  # not of another choice
+        fitting = [word for word in words if _key(word).partition(".")[0] not in chosen]  # the user's groups win
         asked = {_key(word): word for word in (*fitting, *own, f"name={name}")}
         stage = worded_job("train", [*asked.values()], job.folder / name)
         if jobs:
@@ -236,11 +236,11 @@ def _overview(stages: Sequence[Job], results: Sequence[TrainingResult]) -> str:
 
 
 def judged(job: Job, last: Path) -> str:
-    """Write the mean of the last stage's policies, and judge it in fresh draws of its worlds, in both engines."""
+    """Write the mean of the last stage's policies, and evaluate it in fresh draws of its worlds, in both engines."""
     kept = min(composed("average", []).last, len(list(last.glob("policy_[0-9]*.safetensors"))))
     policy = job.folder / POLICY
     save_policy(policy, *averaged(kept_policies(last, kept) if kept else [last / POLICY]))
-    said, named = [], {_key(word) for word in job.words} & {"hand", "object"}  # which no policy's file has read
+    said, named = [], {_key(word) for word in job.words} & {"hand", "object"}  # policy files lack them
     again = [word for word in job.words if _key(word).partition(".")[0] in named]
     for engine in ENGINES:
         words = [as_word("policy", policy), *job.config.judgement, *again, f"engine={engine}"]

@@ -1,4 +1,4 @@
-"""The last check of every command, and how the commands to a robot end: where the fingers press on nothing."""
+"""Final check of every command to a robot, and the stop sequence that lets the fingers go."""
 
 import time
 from collections.abc import Callable
@@ -16,7 +16,7 @@ ROUNDING = 1e-9  # [rad] of angles that add up ticks
 
 
 class CommandGuard:
-    """Takes readings over only if a joint can have moved so, and lets commands out only within the limits.
+    """Accepts only plausible readings, and returns only commands within the limits.
 
     Every command is finite, within the range, at most rate * dt away from the one before, and at most torque / K_P
     away from the last accepted angles. A reading around which no such command exists is not accepted.
@@ -45,18 +45,18 @@ class CommandGuard:
 
     @property
     def ready(self) -> bool:
-        """Whether so many readings agree that commands may begin."""
+        """Whether enough readings in a row agree for commands to begin."""
         return self._agreeing >= AGREEING
 
     @property
     def saturated(self) -> NDArray[np.bool_]:
-        """Joints whose command demands all the torque there is `(joints,)`."""
+        """Joints whose command demands the whole torque limit `(joints,)`."""
         if self.state is None or self.command is None:
             return np.zeros(len(self.names), dtype=bool)
         return np.asarray(np.abs(self.command - self.state.q_m) > 0.99 * self._reach)
 
     def accept(self, now: float, reading: Reading) -> str:
-        """Take a reading over as the state; return "" or why it is not believed; `now` is on the robot's clock [s]."""
+        """Accept a reading as the state; return "", or why it is rejected; `now` is on the robot's clock [s]."""
         q_m = np.array(reading.q_m, dtype=np.float64)  # the robot may use its arrays again
         torque = None if reading.torque is None else np.array(reading.torque, dtype=np.float64)
         taken = Reading(min(reading.time, now), q_m, torque)
@@ -73,9 +73,9 @@ class CommandGuard:
         return now - self._sent
 
     def checked(self, dt: float, wanted: Array) -> Array:
-        """Return the command to send `(joints,)` [rad], `dt` [s] after the last: near the wanted one, in every limit.
+        """Return the command nearest to the wanted one within all limits `(joints,)` [rad], `dt` [s] after the last.
 
-        Where what is wanted is no number, the command stays. Where commands failed for so long that none keeps rate
+        Where the wanted value is not finite, the command stays. Where commands failed for so long that none keeps rate
         and torque, it keeps the torque.
         """
         if self.state is None:
@@ -87,7 +87,7 @@ class CommandGuard:
         return np.asarray(np.clip(pressing, limits.lower, limits.upper))
 
     def sent(self, now: float, command: Array) -> None:
-        """Take note of a command that the robot took, at `now` of its clock [s]; one that failed has not been sent."""
+        """Record a command that the robot took, at `now` of its clock [s]; do not call it for one that failed."""
         self.command, self._sent, self.sent_at = command, now, self.clock()
 
     def _step(self, dt: float) -> float:
@@ -137,11 +137,11 @@ PERIOD = 0.001  # shortest time between two commands [s]
 
 
 class StopError(RuntimeError):
-    """The fingers may still press: the robot did not take the commands that end it."""
+    """The fingers may still press: the robot did not take the commands that let go."""
 
 
 class Phase(StrEnum):
-    """What the stop is doing."""
+    """Phase of a stop."""
 
     LOOKING = "looking"  # commands ceased for so long that the fingers may be elsewhere; nothing is sent
     RETURNING = "returning"  # the commands go to the goal
@@ -150,7 +150,7 @@ class Phase(StrEnum):
 
 
 class Stop:
-    """The last commands, by the clock of this computer, in steps that are bounded whatever the robot's clock says.
+    """Stop sequence: the last commands, by this computer's clock, in steps bounded whatever the robot's clock says.
 
     The goal is the last accepted angles, within the joints' range. Who drives it gives what `command` returns to the
     robot and calls `sent` if the robot took it, or gives it measurements by `look` while it returns None.
@@ -190,7 +190,7 @@ class Stop:
         return self._offered.copy()
 
     def sent(self) -> None:
-        """Take note that the robot took the last command."""
+        """Record that the robot took the last command."""
         assert self._offered is not None
         self._guard.sent(np.nan, self._offered)
         self.phase = Phase.RESTING if self.torque <= self._guard.rules.tolerance else Phase.RETURNING
@@ -199,7 +199,7 @@ class Stop:
             self._end()
 
     def look(self, now: float, reading: Reading | None) -> None:
-        """Take a measurement while looking; as many as agree at the beginning of a run give the goal anew."""
+        """Take a measurement while looking for a new goal, set once as many agree as at the beginning of a run."""
         if reading is not None:
             self._fresh.accept(now, reading)
         if self._fresh.ready:
@@ -224,7 +224,7 @@ class Stop:
 
 
 def let_go(stop: Stop, robot: Robot, alive: Callable[[], None]) -> None:
-    """Drive a stop to its end, whatever the robot's methods raise; `alive` is called at each step.
+    """Run a stop to its end, whatever the robot's methods raise; `alive` is called at each step.
 
     Raises:
         StopError: the fingers may still press.

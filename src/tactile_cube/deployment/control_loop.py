@@ -1,4 +1,4 @@
-"""The robot's side in one place: a fast loop that opens, waits for the object, asks the policy and stops by itself."""
+"""Control loop of a robot: opens the fingers, waits for the object, runs the policy and stops by itself."""
 
 import time
 from collections.abc import Callable
@@ -21,7 +21,7 @@ ROUNDING = 1e-9  # [s] of clocks that add up ticks
 
 
 class Mode(StrEnum):
-    """What the loop is doing."""
+    """Mode of the loop."""
 
     WAITING = "waiting"  # too few measurements agree yet; nothing is sent
     HOMING = "homing"  # the fingers open for the object, or go to the start angles where none is awaited
@@ -71,7 +71,7 @@ class Move:
         return now - self._in_place >= self._homing.settle
 
     def failure(self, now: float, q_m: Array) -> str:
-        """Return why there is nothing more to wait for; "" while there is."""
+        """Return why the move has failed; "" if it has not."""
         took = now - self._began
         if took <= self._needs + self._homing.timeout:
             return ""
@@ -85,7 +85,7 @@ class Move:
 
 
 class ControlLoop:
-    """One call of `tick` is one period of the fast loop, at 1 kHz on the robot; it never waits.
+    """Control loop: one call of `tick` is one period, at 1 kHz on the robot; it never waits.
 
     What it sends passes `CommandGuard` last. Whoever drives it says by `sent` that the robot took a command, and
     drives what `stop` returns once the loop is stopped; see `let_go`.
@@ -103,7 +103,7 @@ class ControlLoop:
 
     Attributes:
         reason: why it stopped; "" before.
-        doubted: measurements that were not believed; `doubt` says why the last of them was not.
+        doubted: number of rejected measurements; `doubt` says why the last of them was rejected.
         q_n: desired angles of the policy `(joints,)` [rad]; q_f are the filtered ones.
 
     Raises:
@@ -138,7 +138,7 @@ class ControlLoop:
 
     @property
     def doing(self) -> str:
-        """What it is doing, in words."""
+        """Present mode, in words."""
         start = "the fingers go to the start angles"
         policy = "the policy decides; let go of the object"
         return {
@@ -150,11 +150,11 @@ class ControlLoop:
 
     @property
     def accepted(self) -> Reading | None:
-        """The last measurement that was believed."""
+        """The last measurement that was accepted."""
         return self._guard.state
 
     def warm_up(self) -> None:
-        """Compile and load all that a tick needs, so that none comes late for it; nothing is sent."""
+        """Compile and load all that a tick needs, so that no tick is late; nothing is sent."""
         self._decides.reset()
         self._decides.step(self._home.copy(), self._home.copy())
         low_pass(0.0, 0.0, self._time_constant, 1.0)
@@ -189,7 +189,7 @@ class ControlLoop:
         return self._offered.copy()
 
     def sent(self) -> None:
-        """Take note that the robot took the command of the last tick."""
+        """Record that the robot took the command of the last tick."""
         if self._offered is not None:
             self._guard.sent(self.time, self._offered)
 
@@ -199,7 +199,7 @@ class ControlLoop:
             self._move, self.mode = Move(self._homing, self.time, self.q_f, self._home), Mode.CLOSING
 
     def stop(self, reason: str) -> Stop:
-        """Let the policy decide no more; return what has the commands from now on."""
+        """Stop the policy; return the stop sequence, which gives the commands from now on."""
         if self.mode is not Mode.STOPPED:
             doubts = f"; {self.doubted} measurement(s) not believed, the last: {self.doubt}" if self.doubted else ""
             self.mode, self.reason = Mode.STOPPED, reason + doubts

@@ -67,7 +67,7 @@ def read_network(path: Path) -> Network:
 
 
 class PolicyController:
-    """Asks the network at 10 Hz: `step` takes q_m of the hand and q_f of the fast loop's filter, which takes its q_n.
+    """Runs the network at 10 Hz: `step` returns q_n from q_m of the hand and q_f of the fast loop's filter.
 
     Args:
         network: the policy.
@@ -108,7 +108,7 @@ class PolicyController:
 
 
 class PlayedTargets:
-    """Gives one row of `targets` `(steps, 12)` [rad] after the other at 10 Hz, and the last one for good."""
+    """Plays the rows of `targets` `(steps, 12)` [rad] at 10 Hz, then repeats the last one."""
 
     def __init__(self, targets: Array) -> None:
         self._targets, self._row = targets, 0

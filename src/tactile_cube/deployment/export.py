@@ -141,7 +141,7 @@ def _task(setting: TrainingSetting) -> dict[str, Any]:
 
 
 def weights_hash(network: Network) -> str:
-    """Return the SHA-256 of what the file computes with."""
+    """Return the SHA-256 of the weights and biases that give the action."""
     digest = hashlib.sha256()
     for weight, bias in network.deterministic_layers():
         digest.update(np.ascontiguousarray(weight, dtype="<f4").tobytes())

@@ -1,4 +1,4 @@
-"""What the control loop needs of a hand, be it simulated or real, and what a command to it never exceeds."""
+"""Interface of a hand, simulated or real, to the control loop, and the limits of its commands."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Reading:
-    """What the hand measured.
+    """Measurement of the hand.
 
     Attributes:
         time: when, on the clock of `Robot.wait` [s].
@@ -98,7 +98,7 @@ class JointLimits:
 
 @dataclass(frozen=True)
 class StopRules:
-    """What a measurement may be, when the loop stops and how: `stop` of conf/deploy.yaml [s, rad, rad/s, N m]."""
+    """Which measurements are accepted, when the loop stops and how: `stop` of conf/deploy.yaml [s, rad, rad/s, N m]."""
 
     silence: float = 0.02
     lateness: float = 0.02
@@ -114,7 +114,7 @@ class StopRules:
 
 
 class Watchdog:
-    """Judges every tick by the stop rules."""
+    """Checks every tick against the stop rules."""
 
     def __init__(self, rules: StopRules, names: tuple[str, ...]) -> None:
         self._rules, self._names = rules, names

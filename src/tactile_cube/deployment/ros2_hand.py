@@ -64,7 +64,7 @@ class Ros2Hand:
         return time.monotonic()
 
     def read(self) -> Reading | None:
-        """Take what has come in and return the newest, or None."""
+        """Process the messages received and return the newest measurement, or None."""
         self._rclpy.spin_once(self._node, timeout_sec=0.0)
         reading, self._new = self._new, None
         return reading
@@ -78,18 +78,18 @@ class Ros2Hand:
         self._publisher.publish(message)
 
     def wait_for_object(self) -> bool:
-        """Say once how to confirm; return whether somebody did since."""
+        """Log once how to confirm; return whether somebody has confirmed since."""
         if not self._waits:
             self._waits = True
             self._node.get_logger().info(f"wait for object: confirm with std_msgs/Empty on {self._confirm_topic}")
         return self._confirmed
 
     def release(self) -> None:
-        """Say that the policy decides now."""
+        """Log that the policy decides from now on."""
         self._node.get_logger().info("release the object: the policy decides")
 
     def close(self) -> None:
-        """Leave ROS 2."""
+        """Shut the node down."""
         self._node.destroy_node()
         self._rclpy.try_shutdown()
 

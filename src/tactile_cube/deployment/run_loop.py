@@ -37,7 +37,7 @@ BEHIND = 20  # chunks that may wait for the disk
 
 
 class LoopLog:
-    """Measurements that were believed and the commands that were sent then, in an `.npy` file that grows.
+    """Log of accepted measurements and the commands sent at those times, in an `.npy` file that grows.
 
     A thread writes, so that no tick waits for the disk. Whenever the program ends, by a crash too, `numpy.load` reads
     the file up to the last chunk. Time counts from the first row.
@@ -65,7 +65,7 @@ class LoopLog:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Write what waits and close the file.
+        """Write the waiting rows and close the file.
 
         Raises:
             OSError: it could not be written.
@@ -79,7 +79,7 @@ class LoopLog:
 
     @property
     def rows(self) -> Rows:
-        """What was written, read from the disk where it is looked at."""
+        """The rows written so far, memory-mapped."""
         return np.asanyarray(np.load(self.path, mmap_mode="r" if self._written else None))
 
     def append(self, reading: Reading, command: Array) -> None:
@@ -178,7 +178,7 @@ class NotedSignals:
         self._stepped = time.monotonic()
 
     def alive(self) -> None:
-        """Say that nothing hangs."""
+        """Report that the program is not hanging."""
         self._stepped = time.monotonic()
 
     def __enter__(self) -> NotedSignals:
@@ -284,14 +284,14 @@ def _tick(loop: ControlLoop, robot: Robot, now: float, run: LoopRun, log: LoopLo
     run.ticks[round(1e6 * (time.perf_counter() - began))] += 1
     if q_d is None:
         return
-    robot.send(q_d.copy())  # what is sent is the robot's
+    robot.send(q_d.copy())  # a copy: the robot may keep what it is sent
     loop.sent()
     if log is not None and running and loop.accepted is not None and loop.accepted is not before:
         log.append(loop.accepted, q_d)
 
 
 class EnterKey:
-    """Enter on the terminal, where there is one to read from, from now on: what was typed before does not count."""
+    """Enter key of the terminal, if there is one; what was typed before does not count."""
 
     def __init__(self) -> None:
         self.usable = sys.stdin is not None and sys.stdin.isatty()

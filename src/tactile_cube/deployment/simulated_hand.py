@@ -27,7 +27,7 @@ class Disturbed:
 
 
 class SimulatedHand:
-    """A world that moves on while the loop waits; arguments are those of conf/robot/simulated.yaml.
+    """Simulated hand whose world advances while the loop waits; arguments are those of conf/robot/simulated.yaml.
 
     `setting` has hand, object, table and task; None: the DLR-Hand II around the nominal cube. `cube` says whether there
     is an object to turn.
@@ -67,7 +67,7 @@ class SimulatedHand:
         return self._setting.task.direction * self._theta[-1 - since]
 
     def wait(self) -> float:
-        """Let the world go on by a period, by more where the tick is late."""
+        """Advance the world by a period, by more if the tick is late."""
         late = self._rng.random() < self._link.jitter
         for _ in range(1 + (int(self._rng.integers(1, 6)) if late else 0)):
             if self._ticks - self._sent == self._timeout:  # nobody commands any more
@@ -92,7 +92,7 @@ class SimulatedHand:
         self._q_d, self._sent = np.array(q_d), self._ticks
 
     def wait_for_object(self) -> bool:
-        """Wait for nobody: `release` puts the object where somebody would have held it."""
+        """Return at once: `release` puts the object where somebody would have held it."""
         return True
 
     def release(self) -> None:

@@ -1,4 +1,4 @@
-"""What a policy was trained with, from what its file says: hand, object, constants, task."""
+"""Training setting of a policy, read from its file: hand, object, constants, task."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from tactile_cube.randomization import StartStates
 from tactile_cube.simulation import EpisodeConstants, constants_of
 
 DRIVES = {"kp": (0.5, 2.0), "kd": (0.5, 2.0), "torque_limit": (0.0, 1.0)}
-"""Between which multiples of the hand's own the gains and the torque limit of a training may lie."""
+"""Allowed range of a training's gains and torque limit, as multiples of the hand's own."""
 MISS = 0.01
-"""How far a fingertip may be off the place that it is to have at the object [m]; more is out of the hand's reach."""
+"""Largest distance of a fingertip from its place at the object [m]; beyond, the object is out of reach."""
 CONSTANTS = {"object", *(field.name for field in fields(EpisodeConstants))}
 
 
@@ -51,7 +51,7 @@ def training_setting(
     object: Mapping[str, Any] | None = None,
     label: str = "the policy",
 ) -> TrainingSetting:
-    """Return what a policy was trained with, from what its file says beside its weights.
+    """Return the training setting of a policy from the metadata of its file.
 
     `hand` and `object` are those that the file names, where their files are none of the package's: no file has another
     file read. Messages call the policy `label`.

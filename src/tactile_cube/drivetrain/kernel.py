@@ -1,4 +1,4 @@
-"""Turns the steps into machine code for one plant, kept on disk so that the next process starts at once."""
+"""Compile the steps for one plant, and keep the machine code on disk for the next process."""
 
 import hashlib
 import inspect
@@ -28,7 +28,7 @@ Shape = tuple[int, ...]
 
 @dataclass(frozen=True)
 class Topology:
-    """What is compiled into a kernel: `chains` equal trees and how their dofs hang together.
+    """Structure compiled into a kernel: `chains` equal trees, and how their dofs are connected.
 
     Attributes:
         chains: C, number of fingers.

@@ -1,4 +1,4 @@
-"""The one file that says what was identified: values, intervals, effects, provenance and errors, as plain YAML."""
+"""File of an identified model: values, intervals, effects, provenance and errors, as plain YAML."""
 
 import math
 from collections import Counter
@@ -20,7 +20,7 @@ OBJECT_EFFECTS = (
 """Effects of fingertips and object, which `simulation.contact_effects` describes; no joint has them."""
 NOT_NEGATIVE = ("kp", "kd", "torque_limit", "stiffness", "static_friction", "reflected_inertia")
 MAY_BE_INFINITE = ("stiffness", "torque_limit", "rate_limit")
-"""Constants of a drive that need not end: a rigid one, one that is not limited."""
+"""Constants of a drive that may be infinite: it is rigid, or not limited."""
 
 
 class Strict(BaseModel):
@@ -55,7 +55,7 @@ class Estimate(Strict):
 
     @property
     def finite(self) -> bool:
-        """Whether value and interval are."""
+        """Whether value and interval are finite."""
         return all(map(math.isfinite, (self.low, self.value, self.high)))
 
 
@@ -77,7 +77,7 @@ class EffectEstimate(Strict):
 
     @property
     def of_object(self) -> bool:
-        """Whether it is one of the contact, and not of the drivetrain."""
+        """Whether it is an effect of the contact, not of the drivetrain."""
         return self.name in OBJECT_EFFECTS
 
 

@@ -23,7 +23,7 @@ _POSITIVE = ("stiffness", "torque_limit", "rate_limit")
 
 @dataclass(frozen=True)
 class DrivetrainConstants:
-    """What turns a desired joint angle into a joint torque; the defaults are the hand's.
+    """Constants of the drive, from a desired joint angle to a joint torque; the defaults are the hand's.
 
     Source: Sievers, Pitz, Bauml (ICRA 2022), table of the authors' website.
 

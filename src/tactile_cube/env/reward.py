@@ -194,7 +194,7 @@ class Reward:
     fastest: float
 
     def __init__(self, fastest: float = 1.0, **weights: float):
-        """Refuse terms that there are none of, and values without a meaning."""
+        """Refuse unknown terms and invalid weights."""
         given = PUBLISHED | weights
         for key, value in (given | {"fastest": fastest}).items():
             if key not in (*TERMS, "fastest"):

@@ -35,7 +35,7 @@ LOST = frozenset((DROPPED, LEFT_RANGE, TILTED, LIFTED))
 
 @dataclass(slots=True)
 class TimeStep:
-    """What the task says after a reset or a policy step.
+    """Result of a reset or a policy step.
 
     Attributes:
         joint_position: q_m as the policy sees it, before sensor noise `(joints,)` [rad].
@@ -70,7 +70,7 @@ class TimeStep:
 
 
 class RotationEnv:
-    """One hand, one cube, one episode after the other.
+    """Rotation task of one hand and one cube.
 
     Every episode draws from a generator of its own, made of the seed, the world's index and the episode's number, so
     that what happens in it depends on nothing else.

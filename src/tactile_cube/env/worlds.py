@@ -54,7 +54,7 @@ class WorldsEnv(EnvBase):  # type: ignore[misc]
 
     @property
     def conditions(self) -> Conditions:
-        """Of the episodes that start from now on."""
+        """Conditions of the episodes that start from now on."""
         return self.tasks[0].conditions
 
     @conditions.setter
@@ -64,7 +64,7 @@ class WorldsEnv(EnvBase):  # type: ignore[misc]
 
     @property
     def odds(self) -> Array:
-        """Of the parts of the ranges of steered constants, in the episodes that start from now on."""
+        """Probabilities of the parts of the steered constants' ranges, in the episodes that start from now on."""
         return self.tasks[0].odds
 
     @odds.setter

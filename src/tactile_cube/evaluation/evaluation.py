@@ -28,12 +28,12 @@ from tactile_cube.transforms import EnvConfig, make_env
 from tactile_cube.whole_file import write_whole
 
 Report = Callable[[str, EpisodeResult], None]
-"""Told the variant's name and the result of each episode as it ends."""
+"""Callback that gets the variant's name and the result of each episode as it ends."""
 
 
 @dataclass(frozen=True)
 class VariantResult:
-    """What came of one variant."""
+    """Result of one variant."""
 
     variant: Variant
     results: list[EpisodeResult]
@@ -183,7 +183,7 @@ class DisplacedStart:
 
 FORMAT = "tactile_cube results 1"
 KEYS = ("created", "protocol", "policy", "task", "seed", "command", "cpu_hours", "variants")
-"""What everybody who reads a results file relies on."""
+"""Keys that every results file must have."""
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from tactile_cube.simulation import EpisodeConstants, Start, World
 Array = NDArray[np.float64]
 
 CLEARANCE = 1e-3
-"""Between fingertip and face before the hand closes [m]; as in conf/start/wide_yaw.yaml."""
+"""Gap between fingertip and face before the hand closes [m]; as in conf/start/wide_yaw.yaml."""
 REACHED = 1e-3
 """A place counts as reachable if the fingertip comes this near to it [m]: a tenth of how deep targets press."""
 BETWEEN_TIPS = 2e-3
@@ -42,7 +42,7 @@ SHIFTED, TILTED = 0.012, 0.25
 TOUCHING = 3
 """Least number of fingertips that hold it."""
 TRIES = 100
-"""For each grasp wanted, after which the search gives up."""
+"""Tries for each grasp wanted, after which the search gives up."""
 
 
 def find_grasps(world: World, constants: EpisodeConstants, count: int, seed: int) -> Grasps:

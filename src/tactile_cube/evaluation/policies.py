@@ -1,4 +1,4 @@
-"""What decides in an episode, a trained actor or a baseline, and the environment that it is tried in."""
+"""Policies to be evaluated, trained actors and baselines, and the environment of an evaluation."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -51,7 +51,7 @@ class ActorPolicy(Policy):
 
 
 class HoldPolicy:
-    """Squeezes the cube where it is and never moves again; it is told where the cube starts."""
+    """Squeezes the cube at its start pose, which it is given, and never moves again."""
 
     def start(self, env: RotationEnv, seed: int) -> None:
         """Aim the fingertips `SQUEEZE` inside the faces."""
@@ -176,7 +176,7 @@ def find_policy(name: str | None) -> PolicySource:
 CONSTANTS = "tactile_cube.simulation.constants_of"
 GROUPS = ("task", "reward", "randomization", "start")
 PUBLISHED_SPINNING_FRICTION = 0.1
-"""What policies were trained at [m] before files stated it: it was the only nominal value then."""
+"""Spinning friction [m] of policies whose files do not state it: it was the only nominal value then."""
 
 
 def environment(config: DictConfig, source: PolicySource, choices: Mapping[str, str | None]) -> EnvConfig:

@@ -1,4 +1,4 @@
-"""How a policy is tried: how many episodes, how long, and in which changes of the world."""
+"""Protocols of an evaluation: number and length of episodes, and changes of the world."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -18,12 +18,12 @@ from tactile_cube.simulation import EpisodeConstants, SimulationOptions
 from tactile_cube.transforms import EnvConfig
 
 UNCHANGED = "worlds as drawn"
-"""Name of the condition that changes nothing of what randomisation and starts draw."""
+"""Name of the condition in which worlds and starts stay as drawn."""
 CHANGEABLE = {"constants": EpisodeConstants, "simulation": SimulationOptions}
 
 
 class NumbPolicy:
-    """Another policy whose senses are partly frozen at the first observation of the episode."""
+    """Policy whose senses are partly frozen at the first observation of the episode."""
 
     def __init__(self, policy: Policy, numb: Sequence[str], hand: Hand = DLR_HAND2) -> None:
         self._policy, self._numb = policy, numb_reading(numb, hand)
@@ -81,7 +81,7 @@ class Pull:
         env.world.pull_finger(finger, self.force * outward if acting else np.zeros(3))
 
     def check(self, hand: Hand) -> int:
-        """Refuse fingers that a hand does not have; gives the finger's index."""
+        """Return the finger's index. Raises InputError: the hand has no such finger."""
         fingers = [finger.name for finger in hand.fingers]
         if self.finger not in fingers:
             raise InputError(f"pull.finger is {self.finger!r}; choose one of {', '.join(fingers)}")
@@ -153,7 +153,7 @@ def typical_effects(name: str, hand: Hand = DLR_HAND2) -> list[Effect]:
 
 @dataclass(frozen=True)
 class Protocol:
-    """A protocol, one file of conf/protocol each.
+    """Protocol of an evaluation, as in a file of conf/protocol.
 
     Attributes:
         name: label in tables and files.

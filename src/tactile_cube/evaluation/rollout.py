@@ -1,4 +1,4 @@
-"""Run one episode and write down everything that happens in it."""
+"""Run one episode and record everything that happens in it."""
 
 import dataclasses
 from collections.abc import Callable
@@ -16,7 +16,7 @@ from tactile_cube.simulation import EpisodeConstants
 from tactile_cube.transforms import JointOffset
 
 Interference = Callable[[RotationEnv, int], None]
-"""Something done to the world before each policy step, given the number of the step."""
+"""Callback that may change the world before each policy step, given the step's number."""
 NO_NUMBERS = ("effects", "joints", "object_shape")
 WORLD_SIGNALS = ("q", "q_f", "cube_position", "cube_quaternion")
 CONTACT_KINDS: dict[str, Any] = {"step": np.int64, "finger": np.int64, "tip": np.bool_}
@@ -69,13 +69,13 @@ class Recorder:
         self._sample()
 
     def decided(self, observation: NDArray[np.float32], action: Array) -> None:
-        """Take over what the policy was given, a stack of readings, and the action `(joints,)` it asked for."""
+        """Record the policy's input, a stack of readings, and its action `(joints,)`."""
         q_m, e_q = np.array(observation[-2 * self._task.hand.joints :], dtype=np.float64).reshape(2, -1)
         for name, value in {"q_m": q_m, "e_q": e_q, "action": np.array(action, dtype=np.float64)}.items():
             self._policy.setdefault(name, []).append(value)
 
     def add(self, state: TensorDictBase) -> None:
-        """Take over one policy step that has just been made."""
+        """Record the policy step that has just been made."""
         self._samples["theta"].append(float(state["theta"][0, 0]))
         self._steps["reward"].append(float(state["reward"][0, 0]))
         self._steps["terms"].append(state["reward_terms"][0].double().numpy())

@@ -11,14 +11,14 @@ from scipy.stats import mannwhitneyu
 from tactile_cube.evaluation.protocol import UNCHANGED
 from tactile_cube.evaluation.verdict import SUCCESS, EpisodeResult, EpisodeVerdict
 
-NO_PROPERTY = ("seed", "force_seed")  # where random numbers come from: larger is not more of anything
+NO_PROPERTY = ("seed", "force_seed")  # seeds: their size has no physical meaning
 SIGNIFICANT = 0.05  # for all constants together: one false name in twenty evaluations
 LEAST = 5  # episodes lost and kept, below which no test can tell
 
 
 @dataclass(frozen=True)
 class Summary:
-    """What a set of episodes comes to; means over the episodes, of what `EpisodeResult` has by the same name.
+    """Summary of a set of episodes: mostly means of the values that `EpisodeResult` has under the same names.
 
     Attributes:
         mean_angle: of the final angles, as `std_angle`, `median_angle` and `best_angle` are [rad].
@@ -90,7 +90,7 @@ def summarise(results: Sequence[EpisodeResult]) -> Summary:
 
 
 def wilson_interval(successes: int, trials: int, z: float = 1.96) -> tuple[float, float]:
-    """Return the 95 % interval of a rate; unlike the normal one it is right at 0 and 1, and for few trials.
+    """Return the 95 % interval of a rate; unlike the normal one it holds at 0 and 1, and for few trials.
 
     Source: Wilson, J. Am. Stat. Assoc. 22 (1927).
     """
@@ -156,7 +156,7 @@ class LostWhere:
 
     @property
     def text(self) -> str:
-        """In words."""
+        """The finding in words."""
         thirds = zip(self.kept, self.episodes, self.edges[:-1], self.edges[1:], strict=True)
         parts = (f"{kept} of {count} at {low:.3g} to {high:.3g}" for kept, count, low, high in thirds)
         return f"kept by {self.constant}: {', '.join(parts)} (p {self.p_value:.1e})"

@@ -1,4 +1,4 @@
-"""One row for each episode: a word for what it was, the numbers it rests on, and what is physically wrong with it."""
+"""Verdict on each episode: its class, the numbers that decide it, and physically wrong turning."""
 
 from dataclasses import asdict, dataclass
 from enum import StrEnum
@@ -22,7 +22,7 @@ REGRASP_FACE_CHANGES = 2
 LATE_SHARE, LATE_ANGLE = 0.4, 0.25
 """The last part of an episode, and the angle that must be gained in it [rad]: less means that the hand stagnates."""
 SUCCESS_RATE = 15.0 / 40.0
-"""An episode succeeds that keeps the object to the end and turns it at least so fast on average [rad/s].
+"""Lowest mean speed at which an episode that keeps the object to the end is a success [rad/s].
 
 15 rad in 40 s is the paper's best run (section IV). It depends on no other episode, whatever their length.
 """
@@ -45,7 +45,7 @@ FACES = ("+x", "-x", "+y", "-y", "+z", "-z")
 
 
 class EpisodeVerdict(StrEnum):
-    """What an episode was.
+    """Class of an episode.
 
     - `regrasping`: kept the cube, turned it beyond `REGRASP_ANGLE` and was still turning it at the end (`LATE_ANGLE`),
       and fingers moved to new faces at least `REGRASP_FACE_CHANGES` times.
@@ -114,7 +114,7 @@ class EpisodeResult:
 
     @property
     def success(self) -> bool:
-        """Whether it kept the cube and turned it as `SUCCESS_RATE` asks, in the rewarded direction."""
+        """Whether it kept the cube and turned it at least as fast as `SUCCESS_RATE`, in the rewarded direction."""
         return self.kept and self.final_angle >= SUCCESS_RATE * self.duration
 
     def as_dict(self) -> dict[str, object]:
@@ -123,7 +123,7 @@ class EpisodeResult:
 
 
 def judge_episode(record: EpisodeRecord, episode: int = 0, seed: int = 0) -> EpisodeResult:
-    """Reduce an episode to its row."""
+    """Return the row of an episode in the results table."""
     histories = [finger_history(record, finger) for finger in range(len(record.fingers))]
     angle = float(record.theta[-1] - record.theta[0])
     begin, duration = round((1.0 - LATE_SHARE) * record.steps), float(record.time[-1] - record.time[0])
@@ -261,7 +261,7 @@ def free_spin(record: EpisodeRecord) -> float:
 
 
 def exploits(record: EpisodeRecord) -> list[str]:
-    """Name what is physically wrong with an episode; an empty list when nothing is."""
+    """Return the names of what is physically wrong with an episode."""
     gained = float(record.theta[-1] - record.theta[0])
     found = {
         "angle_mismatch": abs(gained - integrated_rotation(record)[-1]) > MAX_ANGLE_MISMATCH + CONE * abs(gained),

@@ -1,4 +1,4 @@
-"""What the mechanism is: the hand's geometry, masses and limits, its kinematics and its URDF description."""
+"""The mechanism: the hand's geometry, masses and limits, its kinematics and its URDF description."""
 
 from tactile_cube.hand.dlr_hand2 import DLR_HAND2, published_hand
 from tactile_cube.hand.gait import Gait

@@ -30,7 +30,7 @@ class Chain:
     tip: Array
 
     def tips(self, position: Array, rotation: Array, q: Array) -> Array:
-        """Tip in the world (n, 3) [m] for angles q (n, J) [rad], the first joint's frame at `position` (3,) [m]."""
+        """Return the tip in the world (n, 3) [m] for angles q (n, J) [rad], the first frame at `position` (3,) [m]."""
         return self.motion(position, rotation, q)[0]
 
     def motion(self, position: Array, rotation: Array, q: Array) -> tuple[Array, Array]:

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 PLACES = np.radians([-90.0, 0.0, 90.0, 180.0])
 """Where ring, middle, fore and thumb of the DLR-Hand II stand around the cube."""
 SEARCH_KEYS = ("name", "steps", "cpu_hours", "wall_hours", "commit")
-"""What is known of the search behind a range of gaits."""
+"""Keys that describe the search behind a range of gaits."""
 
 
 def places(hand: Hand) -> Array:
@@ -31,7 +31,7 @@ def places(hand: Hand) -> Array:
 
 @dataclass(frozen=True)
 class Gait:
-    """Shape of the walk.
+    """Parameters of a scripted gait.
 
     The defaults were found by cross-entropy searches at full weight, T_s 0.25 and 0.5 s, and the published 0.1 m of
     spinning friction; `python -m benchmarks.gait` searches again. About -z is what this hand pose turns best.
@@ -105,7 +105,7 @@ class Gait:
 
 @dataclass(frozen=True)
 class GaitRanges:
-    """Gaits that do alike: each number lies between two bounds.
+    """Ranges of gaits that perform alike: each parameter lies between two bounds.
 
     Attributes:
         low: the smallest of each number, by the names of `Gait`.
@@ -131,7 +131,7 @@ class GaitRanges:
             raise InputError(f"exploration.gaits.search.{name}: not one of {', '.join(SEARCH_KEYS)}")
 
     def draw(self, rng: np.random.Generator) -> Gait:
-        """Return one of them, all equally likely."""
+        """Draw one of them, all equally likely."""
         values = {name: rng.uniform(low, self.high[name]) for name, low in self.low.items()}
         whole = {name: round(values[name]) for name in ("period", "closing") if name in values}
         return Gait(**values | whole, phases=tuple(self.phases))  # type: ignore[arg-type]

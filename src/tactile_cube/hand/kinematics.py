@@ -1,4 +1,4 @@
-"""Where fingertips are, and joint angles with which they stand around an object."""
+"""Forward kinematics of the fingertips, and joint angles of grasps around an object."""
 
 from collections.abc import Sequence
 

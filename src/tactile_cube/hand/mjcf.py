@@ -126,7 +126,7 @@ USUAL_GRAVITY = (0.0, 0.0, -9.81)  # that importers take where none is said [m/s
 
 @dataclass(frozen=True)
 class Mjcf:
-    """What a mechanism is, and what its file states of drives.
+    """Mechanism of an MJCF file, and what the file states of drives.
 
     Attributes:
         urdf: the mechanism as a URDF.

@@ -29,7 +29,7 @@ UNITS = {0.001: "millimetres", 0.01: "centimetres", 0.0254: "inches"}
 CONVEX = 0.95
 """Share of its convex hull that a mesh must fill: contacts are then where they would be but for 5 % of the volume."""
 CORNERS = 200
-"""Of the hull at most: the engines look at every one in every contact. On a sphere of 80 mm these are 0.3 mm off."""
+"""Maximum corners of a hull, as every contact costs time for each. On a sphere of 80 mm they are 0.3 mm off."""
 
 
 @dataclass(frozen=True, eq=False)

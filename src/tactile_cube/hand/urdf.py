@@ -1,4 +1,4 @@
-"""Writing URDF text: elements that every mechanism has, shapes, and other masses for the links of one."""
+"""Write URDF text: elements that every mechanism has, shapes, and changed masses of links."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -65,7 +65,7 @@ def inertial_element(mass: float, com: Array, inertia: Array, digits: int = 10) 
 
 
 def origin_element(position: Array, rotation: Array | None = None) -> str:
-    """Place (3,) [m] and rotation (3, 3) as URDF's <origin>."""
+    """Return a position (3,) [m] and rotation (3, 3) as URDF's <origin>."""
     rpy = np.zeros(3) if rotation is None else roll_pitch_yaw(rotation)
     return f'<origin xyz="{number_list(position)}" rpy="{number_list(rpy)}"/>'
 

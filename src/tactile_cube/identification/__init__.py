@@ -1,1 +1,1 @@
-"""Finding which physical effect a model lacks: fit by multiple shooting, screen the catalogue, judge on others."""
+"""Find which physical effect a model lacks: multiple shooting, screening of the catalogue, held-out validation."""

@@ -1,4 +1,4 @@
-"""The numbers that decide what a diagnosis answers, each stated once; conf/criteria holds them with their reasons."""
+"""Thresholds of a diagnosis; conf/criteria states them with their reasons."""
 
 from dataclasses import dataclass
 
@@ -7,19 +7,19 @@ from tactile_cube.errors import InputError
 
 @dataclass(frozen=True)
 class Criteria:
-    """Errors are in units of the sensor noise, shares are of squared errors, all on held-out trials.
+    """Thresholds: errors in units of the sensor noise, shares of squared errors, all on held-out trials.
 
     Attributes:
         floor: error above which a joint is off, so that something is looked for there.
         adequate: error that a model may have to which nothing significant can be added.
         tolerated: error up to which an explanation is complete.
         least_gain: share that an effect has to explain at least; its price.
-        detail: part of its own error in which a law may differ from the real thing.
+        detail: share of its own error by which a law may differ from the real one.
         band: standard deviations of the held-out difference from which on one set is worse than another.
         significant: probability that a named set is chance, all that was looked at counted.
         most: share of the excess error that an explanation explains at least; a further effect, of what is left.
         nearly_whole: share from which on it is the whole but for a detail.
-        most_simulated: trial time that a search may simulate [s]; then it says what it has.
+        most_simulated: trial time that a search may simulate [s]; then it ends with its best answer.
         margin: part of a joint's limits (half its range, its speed, its torque) that a proposed command keeps free.
     """
 
@@ -39,11 +39,11 @@ class Criteria:
         """Refuse a margin that would let a command leave the limits.
 
         Raises:
-            InputError: it is no part of them.
+            InputError: it is not a share from 0 to below 1.
         """
         if not 0.0 <= self.margin < 1.0:
-            raise InputError(f"criteria.margin={self.margin}: is no part of a limit; take 0 to below 1, such as 0.1")
+            raise InputError(f"criteria.margin={self.margin}: not a share of a limit; give 0 to below 1, such as 0.1")
 
 
 STANDARD = Criteria()
-"""What conf/criteria/standard.yaml says too."""
+"""The defaults, the same as in conf/criteria/standard.yaml."""

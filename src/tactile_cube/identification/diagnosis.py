@@ -40,9 +40,9 @@ MOST_INTERVALS = 12
 NOT_ALL = ("unknown_effect", "partly_explained")
 """Verdicts that say that more is missing than is named."""
 LESS = (*NOT_ALL, "ambiguous")
-"""Verdicts that do not say what is missing and that it is all, the one that says least first."""
+"""Verdicts that do not name everything that is missing, the least informative first."""
 ALL = (len(LESS), True)
-"""What an answer says that names all, and leaves little."""
+"""Rank of an answer that names everything and leaves little error, see `Answer.says`."""
 
 
 class Answer(NamedTuple):
@@ -55,14 +55,14 @@ class Answer(NamedTuple):
 
     @property
     def says(self) -> tuple[int, bool]:
-        """How much it says, to be compared: how nearly it names all that is missing, then whether little is left."""
+        """Rank of the answer: how completely it names what is missing, then whether little error is left."""
         little_left = self.verdict.chosen.largest_error <= self.search.criteria.tolerated
         return (LESS.index(self.verdict.kind) if self.verdict.kind in LESS else len(LESS)), little_left
 
 
 @dataclass(frozen=True)
 class Inquiry:
-    """A recording, and how it is asked.
+    """Diagnosis of a recording under some settings.
 
     Attributes:
         recording: two or more trials.
@@ -84,21 +84,21 @@ class Inquiry:
 
     @cached_property
     def parts(self) -> tuple[Recording, Recording, Recording | None]:
-        """The trials to fit, those to judge by, and those that only test, if there are enough."""
+        """Training, validation and test trials; test trials only if there are enough."""
         fitted, held_out = held_out_split(self.recording, seed=self.seed)
         fitted, tested = with_test_part(fitted, len(self.recording.trials), self.seed)
         return fitted, held_out, tested
 
     @cached_property
     def search(self) -> Search:
-        """The trials divided."""
+        """The search on the split trials."""
         fitted, held_out, _ = self.parts
         asked = (self.effects, self.say, self.known, self.criteria)
         return Search(fitted, held_out, noise_with_links(self.recording), *asked)
 
     @cached_property
     def answer(self) -> Answer:
-        """What is found."""
+        """The result of the search."""
         search = self.search
         findings = find(search, self.standard)
         simulations = Simulations(search, findings.base, noise_floor(self.recording))
@@ -144,7 +144,7 @@ def beside_disturbances(inquiry: Inquiry) -> Inquired:
 
 
 UNPROVEN = 3
-MOST_STEPS = 1000  # from row to row: more are a sign of a wrong inertia, and would take days
+MOST_STEPS = 1000  # simulation steps a row: more are a sign of a wrong inertia, and would take days
 Say = Callable[[str], None]
 
 
@@ -164,7 +164,7 @@ class Diagnosis:
         standard: the field's standard model, which came first.
         experiment: what would separate the rivals, or an unproven effect from chance; None without either.
         held_out: names of the trials that the search chose by.
-        tested: names of those that nothing was fitted to or chosen by; without any, those that chose test too.
+        tested: names of the trials used for nothing else; without any, the held-out trials test too.
         known: effects of the model that it began with, NAME@JOINT.
         common: joint offsets that may be the encoder's or the initialisations'.
         left_out: excluded intervals, which follow no model.
@@ -194,7 +194,7 @@ class Diagnosis:
 
     @property
     def unproven(self) -> tuple[Explanation, ...]:
-        """What would explain much beside the chosen effects, were the held-out segments enough to show it."""
+        """Large improvements beside the chosen effects that the held-out segments are too few to prove."""
         return tuple(self.findings.unproven(self.criteria)[:UNPROVEN]) if self.verdict.kind in NOT_ALL else ()
 
     def errors(self) -> ModelErrors:
@@ -249,7 +249,7 @@ def diagnose_recording(
 
     summaries, over_noise = tested_with(verdict.chosen)
     if over_noise["with_effects"] > over_noise["refitted"] and verdict.chosen.effects:
-        say(f"{verdict.chosen.label}: worse than without on the trials that test; not recommended")
+        say(f"{verdict.chosen.label}: worse than without it on the test trials; not recommended")
         verdict = Verdict("unknown_effect", findings.base)
         summaries, over_noise = tested_with(findings.base)
     fitted = simulations.final(verdict.chosen)
@@ -284,7 +284,7 @@ def diagnose_recording(
 
 
 def without_needless(answer: Answer) -> Verdict:
-    """Return the verdict without the effects whose final intervals hold what changes nothing.
+    """Return the verdict without the effects whose final intervals include their neutral values.
 
     It stays as it is if the others predict the held-out trials worse alone.
     """
@@ -413,7 +413,7 @@ def write_experiment(diagnosis: Diagnosis, folder: Path) -> Path | None:
 
 
 class Unseen(NamedTuple):
-    """An effect that a joint may have unseen.
+    """Effect at a joint that the trials cannot reveal.
 
     Attributes:
         effect: its name.

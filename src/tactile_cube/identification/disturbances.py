@@ -58,7 +58,7 @@ def disturbances(search: Search, recording: Recording, model: Model) -> list[Dis
 
     Args:
         search: cuts trials into segments and simulates them.
-        recording: every trial, of both parts and those that test.
+        recording: every trial: training, validation and test.
         model: fitted; joint offsets that it lacks are fitted here.
     """
     problem = Problem(search.shooting, search.windows(recording))
@@ -138,7 +138,7 @@ def _intervals(failing: NDArray[np.int64]) -> list[tuple[int, int]]:
     return [(int(part[0]), int(part[-1])) for part in np.split(failing, edges + 1)]
 
 
-SEGMENTS = 32  # enough to tell late commands from laws
+SEGMENTS = 32  # enough to separate late commands from laws
 NEARER = -0.5  # rows: a reading that is as early comes nearer to its stamp with commands a row earlier
 
 

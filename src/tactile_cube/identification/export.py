@@ -192,7 +192,7 @@ def as_bam(model: ModelFile, joint: str | None, actuator: str | None, volts: flo
 OF_MECHANISM = ("mass", "com", "inertia", "gravity", "ratio", "offset")
 OF_JOINT = ("kp", "kd", "torque_limit", "armature", "friction", "damping", "delay")
 OF_SERVO = {True: ("stall", "no_load", "rate"), False: ("bias",)}
-"""What the actuator of a position controller holds beside, as a servo or not."""
+"""Further attributes that the actuator of a position controller holds, as a servo or not."""
 STEP = 1e-4
 """Longest time step [s]: MuJoCo's Euler acts half a step early, 0.15 mrad at 3 rad/s."""
 DRY = 'solreffriction="0.002 1" solimpfriction="0.999 0.9999 0.001 0.5 2"'

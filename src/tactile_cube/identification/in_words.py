@@ -212,7 +212,7 @@ def errors_by_stage(stages: Mapping[str, float], model: ModelFile, units: Mappin
 
 
 MODELS = "each explanation, also with parameters at either end of their intervals"
-PLENTY = 100.0  # times the evidence that is needed: how much more is of no use to anybody
+PLENTY = 100.0  # times the evidence that is needed; larger ratios are shown as "more than" this
 
 
 def next_steps(experiment: Experiment, units: Mapping[str, str]) -> list[str]:

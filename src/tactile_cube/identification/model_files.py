@@ -1,4 +1,4 @@
-"""What was identified, as a model file, and what has changed between two of them."""
+"""The model file of an identification, and the changes between two of them."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

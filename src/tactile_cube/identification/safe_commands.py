@@ -26,7 +26,7 @@ FILLER = 1000.0  # times what the trials reached: a number that fills a field of
 
 @dataclass(frozen=True)
 class Envelope:
-    """What joints do at most; of joints that slide in m and N.
+    """Largest positions, speeds and torques of joints; of joints that slide in m and N.
 
     Attributes:
         low: lowest position (n,) [rad].
@@ -56,7 +56,7 @@ class Envelope:
 
     @property
     def middle_and_half(self) -> tuple[Array, Array]:
-        """Of the range of positions [rad]."""
+        """Middle and half width of the range of positions [rad]."""
         return 0.5 * (self.low + self.high), 0.5 * (self.high - self.low)
 
     def of_joint(self, joint: int) -> dict[str, float | None]:
@@ -67,11 +67,11 @@ class Envelope:
 
 @dataclass(frozen=True)
 class Limits:
-    """What the joints may do.
+    """Limits of the joints.
 
     Attributes:
         largest: the limits themselves.
-        sources: position, speed, torque -> who says so, for each joint: `URDF`, `controller` or `trials`.
+        sources: position, speed, torque -> the source for each joint: `URDF`, `controller` or `trials`.
     """
 
     largest: Envelope
@@ -204,7 +204,7 @@ SCALES = [0.8**k for k in range(11)]  # of a command about its middle, down to a
 
 @dataclass(frozen=True)
 class Safety:
-    """What a command does in every model that may be true, beside what it may do.
+    """Envelope of a command in all models that may be true, and its limits.
 
     Attributes:
         limits: of the machine.
@@ -242,7 +242,7 @@ class Safety:
 
 
 class PossibleMotions:
-    """What a command may make of a machine in models that may be true.
+    """Simulation of commands in the models that may be true.
 
     Fitted models are simulated from every start, those with numbers at either end of their intervals from the last.
     """
@@ -324,7 +324,7 @@ def interval_ends(fit: Fit) -> list[Model]:
     """Return the models with each number at either end of its 95 % interval, the others refitted to that.
 
     A number of one kind is at its end at all joints at once, so that a hand needs no more models than a joint.
-    One of which the data say nothing stays as fitted: it has no end that could be tried.
+    A number that is not identifiable stays as fitted: its interval has no ends.
     """
     covariance, unknowns = covariance_of_numbers(fit)
     misfit = max(1.0, fit.cost / max(int(np.count_nonzero(fit.residual)), 1))

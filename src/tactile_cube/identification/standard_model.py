@@ -34,7 +34,7 @@ from tactile_cube.measurement.replay.windows import Windows, between_steps
 from tactile_cube.measurement.units import milli
 
 Array = NDArray[np.float64]
-WINDOWS = (0.05, 0.2, 1.0, 4.0)  # [s] of a finger: short ones from far off, long ones for what is slow
+WINDOWS = (0.05, 0.2, 1.0, 4.0)  # [s] of a finger: short windows for poor start values, long ones for slow effects
 FEWEST_ROWS = 8
 LONGEST_FITTED = 24.0  # [s] of a finger by the number of joints: enough data for a first answer
 ROUNDS, ITERATIONS = 2, 6  # of the robust weights in windows of one length; Gauss-Newton steps in each
@@ -78,7 +78,7 @@ def spreads(scales: Scales) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class StandardModel:
-    """A model with the standard effects, and how it does.
+    """Fitted standard model, and its errors.
 
     Attributes:
         model: with those effects that are found otherwise than stated; what is stated where no fit was better.

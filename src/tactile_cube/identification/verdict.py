@@ -1,4 +1,4 @@
-"""From everything that was tried to an answer: one of five verdicts, and the simulations that it asks for."""
+"""Decide on one of five verdicts from the results of a search and the simulations that it needs."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -31,12 +31,12 @@ Kind = Literal["adequate", "missing_effect", "ambiguous", "partly_explained", "u
 
 @dataclass(frozen=True)
 class Verdict:
-    """The answer.
+    """Verdict of a diagnosis.
 
     Attributes:
         kind: see issue and report.
         chosen: the recommended explanation; the base model where nothing is missing or known.
-        rivals: explanations that this data cannot tell from the chosen one.
+        rivals: explanations that this data cannot distinguish from the chosen one.
     """
 
     kind: Kind
@@ -54,7 +54,7 @@ def decide(findings: Findings, criteria: Criteria = STANDARD) -> Verdict:
     if not found:
         small = base.largest_error <= criteria.adequate
         return Verdict("adequate", base) if small else Verdict("unknown_effect", closest((), findings, criteria))
-    # where none is as good as the best, that one ends at an edge and stands in for what is missing beside the others
+    # if none is as good as the best, the best has a parameter at its bound and absorbs what the others lack
     chosen = simplest(plausible or possible, criteria) if possible else base
     if not nameable(chosen, base, criteria):
         return Verdict("unknown_effect", closest(likely if plausible else found, findings, criteria))
@@ -98,11 +98,11 @@ def unexplained_joints(chosen: Explanation, joints: tuple[str, ...], criteria: C
 
 @dataclass(frozen=True)
 class Unexplained:
-    """What is left at a joint.
+    """Unexplained error of a joint.
 
     Attributes:
         joint: its name.
-        shapes: the missing torque over signals, most telling first.
+        shapes: the missing torque over signals, the best explained first.
         black_box: share of the rest that a black box could still explain beside the recommended model.
         explained: share of the torque missing beside the base model that the recommended model accounts for.
     """

@@ -1,4 +1,4 @@
-"""The sizes of a recording's joints: what every bound, usual size and start of a number follows from."""
+"""Scales of a recording's joints, from which bounds, typical sizes and start values follow."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -1,4 +1,4 @@
-"""Which trials are fitted, which choose, and which only test: split by trial, never by sample."""
+"""Split into training, validation and test trials: by trial, never by sample."""
 
 from collections import Counter
 

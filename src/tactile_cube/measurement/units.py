@@ -1,4 +1,4 @@
-"""In which units people read a joint's numbers: mrad or deg and N m where it turns, mm and N where it slides."""
+"""Display units of a joint: mrad or deg and N m where it turns, mm and N where it slides."""
 
 import math
 import re

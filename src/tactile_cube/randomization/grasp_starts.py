@@ -90,7 +90,7 @@ class StartPoses:
 
 
 SHIPPED = Path(str(resources.files("tactile_cube"))) / "randomization" / "grasps.npz"
-"""Those of the DLR-Hand II around the nominal cube; `tactile_cube.search_grasps` made them."""
+"""Grasps of the DLR-Hand II around the nominal cube; `tactile_cube.search_grasps` made them."""
 COLUMNS = ("angles", "targets", "positions", "quaternions")
 
 

@@ -147,7 +147,7 @@ def build_run(
             _fit("the run's checkpoint", lambda: learner.load_state_dict(saved["learner"]))
         elif training.init_replay:
             learner.replay.load_state_dict(_replay_of(training.init_from))
-        if training.resume == "never":  # nothing refuses any more
+        if training.resume == "never":  # all checks have passed
             _clear(folder, checkpoints)
         ledger = Ledger(folder / LEDGER, collection.cpu_seconds, in_process=collector.kind == "single")
         known = {key: saved[key] for key in ("best_angle", "best_score", "tried") if key in saved} if saved else {}
@@ -165,7 +165,7 @@ def build_run(
             trial=environment.trial,
             **known,
         )
-        held.pop_all()  # it is the run's from here
+        held.pop_all()  # the run closes it from here on
     return run
 
 
@@ -208,7 +208,7 @@ def _warm_start(agent: Agent, path: Path, training: TrainingSettings) -> Trainin
     """Begin from the networks of a checkpoint, or from a policy file's actor; gives the schedule for it.
 
     A policy file holds the actor alone, which gradients of ignorant critics would lead astray (docs/match.md): it waits
-    until fresh ones know what it is worth.
+    until fresh ones have learned its value.
     """
     if path.suffix != POLICY_SUFFIX:
         state = load_checkpoint(path)

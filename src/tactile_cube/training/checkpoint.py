@@ -1,4 +1,4 @@
-"""What a run goes on from, bit for bit: the two newest checkpoints, replay included."""
+"""Checkpoints from which a run resumes bit for bit: the two newest, replay included."""
 
 import hashlib
 import io

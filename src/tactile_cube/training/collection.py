@@ -214,7 +214,7 @@ class MultiSyncCollection:
         return sum(map(_cpu_seconds, self._processes)) if self._final_cpu is None else self._final_cpu
 
     def close(self) -> None:
-        """End the workers: nothing in them is worth a wait, and a stuck one would not react."""
+        """Kill the workers: nothing in them needs saving, and a stuck one would not react."""
         self._final_cpu = self.cpu_seconds()
         self._kill()
         closing = self._thread.submit(partial(self._collector.shutdown, timeout=1.0, raise_on_error=False))
@@ -265,11 +265,11 @@ class MultiSyncCollection:
                 if future.done() or time.monotonic() >= until:
                     raise
                 if not all(process.is_alive() for process in getattr(self._weights.context, "procs", ())):
-                    self._kill()  # what waits for it, says so then
+                    self._kill()  # the call that waits for it then fails
                     until = time.monotonic() + LAST_START
 
     def _kill(self) -> None:
-        idle = self._thread.submit(lambda: None)  # before, it may start one more
+        idle = self._thread.submit(lambda: None)  # until this has run, the thread may start one more process
         until = time.monotonic() + LAST_START
         while not idle.done() and time.monotonic() < until:
             self._kill_children()
@@ -289,7 +289,7 @@ Collection = SingleCollection | MultiSyncCollection
 
 
 class WeightSync(SharedMemWeightSyncScheme):  # type: ignore[misc]
-    """Weights in shared memory, without a farewell: workers are killed, and nobody waits for what they do not read.
+    """Weight transfer by shared memory without a "stop" message: workers are killed, and their queues not waited for.
 
     torchrl's own sends "stop" when it is deleted. Where that is at the end of the interpreter, the thread that a
     queue's first item starts never runs, and the program never ends.

@@ -1,4 +1,4 @@
-"""What a run costs: CPU-hours simulating and learning."""
+"""Compute log of a run: CPU hours of simulation and of learning."""
 
 import json
 import time
@@ -25,7 +25,7 @@ class Costs:
 
 
 class Ledger:
-    """Book-keeping of a session on top of what earlier sessions of the run spent.
+    """Compute log of a session, added to what earlier sessions of the run spent.
 
     Args:
         path: ledger.json of the run folder.

@@ -57,7 +57,7 @@ class Replay:
         self.capacity = capacity
         size = 4 * capacity * sum(self.widths.values())
         memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else size
-        if size > memory:  # it would be taken page by page, hours later
+        if size > memory:  # it would run out only hours later, as pages are first used
             raise InputError(
                 f"training.replay_size={capacity}: takes {size / 2**30:.3g} GiB, this machine has "
                 f"{memory / 2**30:.3g}; keep fewer transitions"

@@ -25,7 +25,7 @@ from tactile_cube.whole_file import write_whole
 FILE, POLICY, BEST_POLICY, FILM = "finished.json", "policy.safetensors", "policy_best.safetensors", "trial.gif"
 INTERRUPTED = "interrupted"
 MASTERED = "mastered:"
-"""How the reason begins for which a run ended that came to its goal."""
+"""First words of the reason if a run ended because it reached its goal."""
 ATTEMPTS = 3
 """Times in a row that workers may fail without a barrier reached in between."""
 
@@ -50,7 +50,7 @@ class Finished:
             found = cls(**json.loads((folder / FILE).read_text()))
         except (OSError, ValueError, TypeError):
             return None
-        # by way of JSON, in which tuples are lists
+        # compared as JSON, in which tuples are lists
         same = found.config == json.loads(json.dumps(config)) and (folder / POLICY).is_file()
         return found if same and config["training"]["resume"] != "never" else None
 
@@ -104,7 +104,7 @@ class Run:
         }
         try:
             if not reason and not self.learner.iteration:
-                self._save()  # from here it goes on when something happens before the first barrier
+                self._save()  # a fault before the first barrier resumes from here
             while not reason:
                 self.learner.run_to_barrier(self._after_iteration)
                 reason = self._reason_to_stop()
@@ -146,7 +146,7 @@ class Run:
             again = f"; the {steps - self.saved_at} steps since then are done again" if steps > self.saved_at else ""
             without = " without training.resume=never" if self.config["training"].get("resume") == "never" else ""
             self.line.say(f"saved at {self.saved_at} steps: the same command{without} goes on from there{again}")
-        own = ((self.config.get("env") or {}).get("start") or {}).get("file")  # which no policy's file has read
+        own = ((self.config.get("env") or {}).get("start") or {}).get("file")  # no policy file may name it
         start = f" start=grasps start.file={own}" if own else ""
         self.line.say(f"see it turn: python -m tactile_cube.evaluate policy={self.folder / POLICY}{start}")
 
@@ -158,7 +158,7 @@ class Run:
             if self.logger is not None:
                 stack.callback(self.logger.close)
             stack.callback(self.learner.collection.close)
-            self.ledger.write(self.saved_at)  # first: the workers take their CPU time with them
+            self.ledger.write(self.saved_at)  # first: the CPU time of ended workers is lost
 
     def _after_iteration(self) -> None:
         learner = self.learner
@@ -205,7 +205,7 @@ class Run:
         learner, angles = self.learner, self.learner.episodes.angles
         if len(angles) == angles.maxlen and learner.episodes.mean_angle > self.best_angle:
             self.best_angle = learner.episodes.mean_angle
-            if not self.best_score:  # nothing better is known
+            if not self.best_score:  # without trials, the training's angle decides
                 self._save_policy(BEST_POLICY)
         self._save_policy(POLICY)
         every = learner.settings.policy_every
@@ -253,7 +253,7 @@ def train_on(build: Callable[[], Run], again: Callable[[], Run] | None = None) -
         print(f"fault: {outcome}; going back to the last barrier with new workers", flush=True)
         build = (again or build) if run is not None else build
         del run
-        gc.collect()  # its replay is as large as the next one's
+        gc.collect()  # frees its replay before the next one is allocated
 
 
 def _session(build: Callable[[], Run]) -> tuple[Run | None, str | CollectionError]:

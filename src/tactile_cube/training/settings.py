@@ -10,7 +10,7 @@ Reference = tuple[tuple[int, float, float], ...]
 
 
 class RunSettings(BaseModel):
-    """What tells runs apart: the name is part of the folder's, the seed is that of everything random."""
+    """Name of a run, a part of its folder's name, and the seed of everything random."""
 
     model_config = ConfigDict(frozen=True)
 
@@ -88,7 +88,7 @@ class TrainingSettings(BaseModel):
 
     @property
     def goal(self) -> str:
-        """What a run finishes early at, in words; "" where it does not."""
+        """Goal at which a run finishes early, in words; "" without one."""
         angle, kept = self.stop_when_angle_above, self.stop_when_kept_above
         parts = [f"{angle:g} rad" if angle is not None else "", f"{100 * kept:g} % kept" if kept is not None else ""]
         return " and ".join(filter(None, parts))

@@ -110,7 +110,7 @@ class TransitionAssembler:
     def __init__(self, n_step: int, gamma: float):
         self.sums = MultiStep(gamma, n_step)
         self.sums.reward_keys = ("reward_terms",)
-        self.sums.done_keys = ()  # how the last step of a sum ended is how the sum ended
+        self.sums.done_keys = ()  # a sum ends as its last step does
         self.pending: TensorDictBase | None = None
 
     def add(self, block: TensorDictBase) -> TensorDictBase:

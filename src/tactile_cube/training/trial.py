@@ -1,4 +1,4 @@
-"""How a policy does while it learns: without exploration, in worlds that stay the same all through a training."""
+"""Trials of a policy during training: without exploration, in worlds that stay the same throughout."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tactile_cube.visualization.episode_recording import write_film
 
 ENGINES = ("bullet", "mujoco")
 SEED = 20_264
-"""Of the trials' worlds; those of a judgement (conf/experiment) and of trainings are others."""
+"""Seed of the trials' worlds; final evaluations (conf/experiment) and trainings have others."""
 SCORE = "score"
 """Mean over engines and episodes of the final angle [rad], 0 where the object is lost."""
 

@@ -1,4 +1,4 @@
-"""From easy to hard: the conditions that episodes start with while training goes on."""
+"""Curriculum: the conditions of episodes, from easy to hard as training goes on."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ def reset_mask(tensordict: TensorDictBase, fresh: TensorDictBase) -> Tensor:
 
 
 class JointOffset(Transform):  # type: ignore[misc]
-    """Encoders that read o too much, the same all episode long.
+    """Joint offset: encoders read o too much, constant over an episode.
 
     The impedance controller regulates what the encoders read, and targets are angles as the encoders would read them.
     So q_m appears as q_m + o, a desired angle q_n means the true angle q_n - o, and e_q = q_f - q_m does not change:

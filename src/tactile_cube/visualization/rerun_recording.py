@@ -174,7 +174,7 @@ def recording_file(
 ) -> Iterator[rr.RecordingStream]:
     """Write a recording; open it with `rerun FILE.rrd`.
 
-    Rerun keeps threads and buffers of every recording until the program ends, unless it is told to let go of those that
+    Rerun keeps threads and buffers of every recording until the program ends, unless it is made to release those that
     nothing refers to any more, which happens here to those of earlier files.
 
     Args:

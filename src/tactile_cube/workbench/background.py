@@ -26,7 +26,7 @@ PHASES = {
     "steps of simulation a sample": 0.05, "base refitted": 0.15, "starts of": 0.3, "  held-out error": 0.7,
     "verdict": 0.9,
 }  # fmt: skip
-"""What lines of a diagnosis contain -> which share of its time has gone by then, about."""
+"""Words in a line of a diagnosis -> rough share of its time that has passed by then."""
 LOOK = 2.0  # [s] between two looks at the clock while it says nothing
 
 
@@ -41,10 +41,10 @@ class Found(NamedTuple):
 
 
 class Diagnosing:
-    """A diagnosis that runs.
+    """Running diagnosis in a process of its own.
 
     Attributes:
-        said: everything that it said; `share`: how much of it is done, about; `best`: its best answer so far, in words.
+        said: all its lines; `share`: rough share that is done; `best`: its best answer so far, in words.
         found: its answer; None: it runs, was stopped or failed.
     """
 

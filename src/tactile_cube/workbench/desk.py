@@ -53,7 +53,7 @@ class Desk:
         self.experiment: Experiment | None = None  # proposed
 
     def changed(self) -> None:
-        """Tell every window."""
+        """Notify every window."""
         for listener in list(self.listeners):
             listener()
 
@@ -63,7 +63,7 @@ class Desk:
         self.changed()
 
     def do(self, words: str, work: Callable[[], object], asked: bool = True) -> None:
-        """Work while the windows stay usable, one thing after another; what goes wrong is shown until more is asked."""
+        """Queue work for the background thread; an error is shown until the next work that a user asks for."""
         self._queued += asked
 
         def run() -> None:
@@ -85,7 +85,7 @@ class Desk:
         self._worker.submit(run)
 
     def beside(self, words: str, work: Callable[[Workbench], object], asked: bool = True) -> None:
-        """Work with the state as it will be then, if there is one."""
+        """Queue work on the workbench that will be loaded then, if there is one."""
         self.do(words, lambda: work(self.bench) if self.bench is not None else None, asked)
 
     def change(self, words: str, work: Callable[[Workbench], object]) -> None:
@@ -176,14 +176,14 @@ class Desk:
         self.waiting, self.preview = Waiting(urdf=bench.opened.rig.path), None
 
     def look(self, joint: str) -> None:
-        """Look at the candidates of a joint, unless that was done."""
+        """Evaluate the candidates of a joint, unless that was done."""
 
         def work(bench: Workbench) -> None:
             if joint not in bench.recording.joints or joint in self.looks:
                 return
             found = bench.candidates(joint, stop=lambda: self._queued > 0)
             if found is None:
-                self.look(joint)  # after what somebody is waiting for
+                self.look(joint)  # again, after the work that a user waits for
             else:
                 self.explainable[joint] = bench.explainable(joint)
                 self.looks[joint] = found
@@ -273,7 +273,7 @@ def _path(text: str) -> Path:
         path.lstat()
     except (FileNotFoundError, NotADirectoryError):
         return path
-    except (OSError, RuntimeError, ValueError) as error:  # a NUL, 10 000 characters, nobody's home
+    except (OSError, RuntimeError, ValueError) as error:  # a NUL, 10 000 characters, the home of an unknown user
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{text[:LABEL]!r}: no name of a file here: {reason}; type another one") from None
     return path

@@ -1,4 +1,4 @@
-"""The page's server: an address that nobody guesses; who may ask it for what, and what a browser may do with it."""
+"""Server of the page: its secret address, access control, and what a browser may do with the page."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from tactile_cube.workbench.desk import Desk
 
 HOST, ENTER, COMMANDS = "127.0.0.1", "/enter", "/next_experiment.csv"
 NONCE = secrets.token_urlsafe(16)
-"""Stands in the page where each answer puts a nonce of its own, of the same length."""
+"""Placeholder in the page, which each response replaces by its own nonce of the same length."""
 MESSAGE = 280_000_000
 """Bytes of a message from the page: two files of `importing.LARGEST` as base64; more closes the connection."""
 BODY = 100_000

@@ -58,7 +58,7 @@ class Preview:
 
 @dataclass(frozen=True)
 class Waiting:
-    """What waits to be imported."""
+    """Files that wait to be imported."""
 
     logs: tuple[Path, ...] = ()  # files, or folders of LeRobot
     urdf: Path | None = None  # of their rig

@@ -1,4 +1,4 @@
-"""One window of a workbench: it shows the desk and hands on what is clicked, and computes nothing."""
+"""One window of a workbench: it shows the state and passes clicks on, and computes nothing."""
 
 from __future__ import annotations
 

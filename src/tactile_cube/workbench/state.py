@@ -1,6 +1,6 @@
 """What a workbench holds: a recording, a model that grows effect by effect, and its error after each step.
 
-Nothing here knows of a browser, and nothing is computed here that `compare`, `identify` and `diagnose` do not compute.
+It needs no browser, and computes only what `compare`, `identify` and `diagnose` compute.
 """
 
 from __future__ import annotations
@@ -50,9 +50,9 @@ from tactile_cube.workbench.parameters import BoundedSearch, Value
 Array = NDArray[np.float64]
 STATED, REFITTED, BY_HAND = "stated", "refitted", "by hand"
 BEGUN = 2  # stages of a model to which nothing was added: stated, refitted
-AT_ONCE = 24  # candidates that are screened between two looks at who waits
+AT_ONCE = 24  # candidates that are screened before checking whether other work waits
 RANKED, LEAST = 10, 0.005  # effects that a look shows, and the share that each takes away at least
-ALIKE = 0.95  # correlation of what two laws change, beside all constants, from which on these trials do not part them
+ALIKE = 0.95  # correlation of two laws' effects, beside all constants, from which on these trials do not separate them
 MOST = 50
 """Changes that can be undone; each keeps a fit and a judgement, some MB."""
 COMMAND = "python -m tactile_cube.workbench recording={}"
@@ -60,7 +60,7 @@ COMMAND = "python -m tactile_cube.workbench recording={}"
 
 @dataclass(frozen=True)
 class ModelStage:
-    """One model on the way, and how it does on the trials that are untouched."""
+    """Model after one change, and its error on the untouched trials."""
 
     label: str  # `stated`, `refitted`, `+ NAME@JOINT`, `- NAME@JOINT` or `by hand`
     fit: Fit  # what it was fitted by; of the stated model, and of values set by hand, the fit that came before
@@ -74,7 +74,7 @@ class ModelStage:
 
 @dataclass(frozen=True)
 class Look:
-    """An effect beside the model in force, after a few steps of its own numbers."""
+    """Effect added to the model in force, after a few steps of its own parameters."""
 
     candidate: Candidate  # the effect in the form that does best
     model: Model  # with it
@@ -83,7 +83,7 @@ class Look:
 
     @property
     def name(self) -> str:
-        """Of the effect."""
+        """Name of the effect."""
         return effect_path(self.candidate.effect)
 
 
@@ -352,7 +352,7 @@ class Workbench:
         judgement = self.search.judged(fit.model)
         model = fit.model.with_offsets(judgement.model.offsets)
         model = model.with_offsets(nominal_model(self.untouched, self.known).offsets)
-        fit = replace(fit, columns=np.zeros(0), residual=np.zeros(0))  # many MB, and taken anew by whoever builds on it
+        fit = replace(fit, columns=np.zeros(0), residual=np.zeros(0))  # many MB, and computed anew where needed
         errors, over_noise = self._tested(fit.model)
         return ModelStage(label, fit, model, judgement, over_noise, errors, half_width, final)
 

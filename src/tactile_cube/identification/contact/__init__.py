@@ -1,1 +1,1 @@
-"""The same for recordings with an object: constants of the contact, and what a grasp says of them."""
+"""Identification from recordings with an object: the constants of the contact."""

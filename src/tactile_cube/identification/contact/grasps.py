@@ -1,4 +1,4 @@
-"""Grasps as a problem of least squares: each trial simulated in the world that training uses.
+"""Least-squares problem of trials with an object, each simulated in the world that training uses.
 
 Where a fingertip first touches decides how hard it presses later, and joint offsets of a degree move it by millimetres.
 So every value of a contact effect is judged with the offsets and the place of the object that suit it best, found anew
@@ -47,11 +47,11 @@ FITTED, JUDGED = 3, 2  # trials of each kind that are fitted and judged by in a 
 
 
 class Grasp:
-    """A trial with an object, and what is left of it when its joint offsets and the object's place suit a contact.
+    """Trial with an object, and its residual after its joint offsets and the object's place are fitted to a contact.
 
     Attributes:
         trial: what was measured.
-        spread: standard deviations of what nobody knows: joint offsets [rad] and the object's displacement [m].
+        spread: standard deviations of the unknown joint offsets [rad] and of the object's displacement [m].
         free: which of these numbers are fitted: those of fingers that take part.
     """
 
@@ -132,7 +132,7 @@ class Grasp:
 
 
 class Grasps(Problem):
-    """The problem of some grasps, one segment each: what is left of it, then the offsets and place that it needed.
+    """Problem of several grasps, one segment each: its residual, then the offsets and displacement that were fitted.
 
     Errors count beside `SCALE`. A segment's weight falls with its own error as in a likelihood of Student's form, so
     that a load which falls in one simulation alone does not decide.
@@ -163,7 +163,7 @@ class Grasps(Problem):
         self._trust: Array = np.ones(len(grasps))
 
     def prediction(self, model: Model) -> Array:
-        """Return minus what is left (G, R), in rad and m."""
+        """Return the negative residual (G, R), in rad and m."""
         return self._padded([-np.r_[left[::EVERY].ravel(), unknown] for unknown, left in self._fitted(model)])
 
     def linearise_starts(self, model: Model) -> None:
@@ -241,7 +241,7 @@ class Grasps(Problem):
 
 @dataclass(frozen=True)
 class OpenGrasps:
-    """The trials with an object of a recording, divided, beside the world that simulates them.
+    """Trials with an object of a recording, split, with the world that simulates them.
 
     Attributes:
         fitted: trials to fit.

@@ -1,4 +1,4 @@
-"""Effects of fingertips and object: those that a user names fitted, and those that a model lacks searched for."""
+"""Effects of fingertips and object: fit those that a user names, and search for those that a model lacks."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -123,7 +123,7 @@ class ContactIdentification:
 
     @property
     def silent(self) -> list[str]:
-        """Parameters of which the trials say nothing: any value that is allowed suits them."""
+        """Parameters that are not identifiable: any allowed value fits the trials."""
         terms, known = self.fitted.model.terms, bounds(self.fitted)
         return [
             f"{terms[u.place].effect.name} {u.key}"
@@ -201,7 +201,7 @@ def _values(values: Mapping[str, float]) -> str:
 
 
 class ContactSearch:
-    """The search for what a contact lacks: laws by themselves, sets that grow, the best judged on held-out trials."""
+    """Search for missing contact effects: single laws, growing sets, the best judged on held-out trials."""
 
     def __init__(self, grasps: OpenGrasps, criteria: Criteria, say: Say) -> None:
         """Simulate the contact as it is stated."""
@@ -224,7 +224,7 @@ class ContactSearch:
         parent, found = Proposal((), self.base.fit), dict[frozenset[tuple[str, str]], Proposal]()
         most = self.criteria.floor
         while len(parent.effects) < MOST and self.problem.judged(parent.fit.model).joint_errors.max() > most:
-            most = self.criteria.adequate  # what a world with the true effects leaves is no reason for one more
+            most = self.criteria.adequate  # the true effects leave as much: no reason for one more
             grown = sorted(self.grown(parent), key=lambda one: one.price(self.criteria))
             found |= {named_by(one.effects): one for one in grown}
             if not grown or grown[0].price(self.criteria) >= parent.price(self.criteria):
@@ -282,11 +282,11 @@ class ContactDiagnosis(ContactIdentification):
 
     @property
     def verdict(self) -> Kind:
-        """The answer in a word."""
+        """Verdict, as in diagnosis.json."""
         return self.answer.kind
 
     def as_json(self) -> dict[str, Any]:
-        """Return the same in the terms of diagnosis.json; errors in rad."""
+        """Return the diagnosis in the terms of diagnosis.json; errors in rad."""
         explanations = [(self.answer.chosen, self.fitted), *self.rivals]
         entries, unknown = effect_entries(explanations), self.verdict == "unknown_effect"
         return {

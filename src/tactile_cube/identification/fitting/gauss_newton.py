@@ -13,7 +13,7 @@ from tactile_cube.measurement.replay.model import Model
 
 Array = NDArray[np.float64]
 DAMPING = 1e-4  # of a first step, in units of the information
-POOR = 1.0  # damping, as large as the information, from which on a fit that stops takes its derivatives anew, finer
+POOR = 1.0  # damping, in units of the information, from which on a fit that stops takes finer derivatives
 CONVERGED = 2e-3  # relative gain below which a fit ends that only has to be compared with others
 SHORTER = (
     6  # shorter and shorter steps that are tried before a fit ends; each costs one simulation, derivatives cost many

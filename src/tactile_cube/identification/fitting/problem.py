@@ -95,10 +95,10 @@ class Shooting(Simulator):
 
 START_POSITION = 1e-3  # [rad] of a finger, as all sizes here: how well a segment's start is known beforehand
 START_SPEED_PER_ACCELERATION = 0.01  # [s]
-RUN_AWAY = 1.0  # [rad] as far off as this counts a simulation that ran away
+RUN_AWAY = 1.0  # [rad] error assigned to a simulation that ran away
 WOUND, REWOUND = 0.1, 2  # [N m] what an integral may hold beyond balance; Gauss-Newton steps that find it
-STEP = 0.2  # finite differences, in units of an unknown's scale: wide enough to bridge what sticks for a moment
-FINE = 0.02  # the same where a step by those found no descent: they are secants, and may point the wrong way
+STEP = 0.2  # finite differences, in units of an unknown's scale: wide enough to bridge short sticking
+FINE = 0.02  # the same where those led to no descent: secants may point the wrong way
 
 
 class Problem:
@@ -124,7 +124,7 @@ class Problem:
 
     @cached_property
     def alike(self) -> list[int]:
-        """Numbers (G,) of the segments that a wrong law misses alike: of one command, about as late in it."""
+        """Group numbers (G,) of segments with similar model errors: the same command at about the same time."""
         numbers: dict[tuple[int, int], int] = {}
         found = []
         for trial, time in zip(self.windows.trial, self.windows.time, strict=True):

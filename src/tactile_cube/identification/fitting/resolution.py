@@ -1,4 +1,4 @@
-"""Time steps that the sensors cannot tell from finer ones, and the final fit with 95 % intervals."""
+"""Simulation steps whose error is hidden by the sensor noise, and the final fit with 95 % intervals."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -18,8 +18,8 @@ from tactile_cube.measurement.replay.model import Model, nominal_model
 from tactile_cube.measurement.replay.windows import Windows, steps_per_row
 
 Array = NDArray[np.float64]
-FINER = 8  # times as short are the steps that show what the model's own ones do: 0.25 ms beside 2 ms
-ENOUGH = 12  # windows that show it, spread over the recording: up to 53 s of a finger
+FINER = 8  # factor by which steps are refined to see the error of the model's own: 0.25 ms beside 2 ms
+ENOUGH = 12  # windows in which it is measured, spread over the recording: up to 53 s of a finger
 
 
 def step_shift(problem: Problem, fitted: Fit) -> Array:
@@ -62,10 +62,10 @@ def finer(windows: Windows, times: int) -> Windows:
     return replace(windows, commands=commands.reshape(count, -1, joints), substeps=fine)
 
 
-FINEST = 8  # times as short steps at most where no rate is stated: so much longer does a diagnosis take
-HIDDEN = 0.2  # of the sensor noise: its square is `criteria.least_gain`, so that mending it is no reason for an effect
+FINEST = 8  # largest factor of refinement where no rate is stated; a diagnosis takes as many times longer
+HIDDEN = 0.2  # error in units of the sensor noise; its square is `criteria.least_gain`, too little to justify an effect
 StepError = Callable[[Recording, int], float]
-"""What steps so many times as short change in a recording's prediction [sensor noise]."""
+"""(recording, factor) -> change of its prediction by steps so many times as short [sensor noise]."""
 
 
 def resolved(

@@ -1,4 +1,4 @@
-"""The numbers of a model that are fitted."""
+"""Free parameters of a model."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -19,7 +19,7 @@ Key = TypeVar("Key", str, int)
 
 @dataclass(frozen=True)
 class Unknown:
-    """A number that is fitted.
+    """Free parameter of a fit.
 
     Attributes:
         kind: a constant of the drive, a joint offset, or a parameter of an effect.

@@ -1,4 +1,4 @@
-"""What may be missing: every effect in every form, and models with simpler, richer, fewer or other ones."""
+"""Candidates: every effect in every form, and models with effects added, removed or refined."""
 
 from __future__ import annotations
 

@@ -22,8 +22,8 @@ from tactile_cube.measurement.replay.model import Model
 Array = NDArray[np.float64]
 FEWEST_BLOCKS = 5  # for an estimate of their scatter
 SLIGHT = 1.0  # [sensor variance] what a number that follows noise alone gains in a segment, in the mean
-INFORMATIVE = 0.01  # of the largest difference: what is less says nothing of a law, only of noise
-FEWEST_PAIRS = 10  # of segments so far apart, that an autocorrelation needs
+INFORMATIVE = 0.01  # share of the largest difference; smaller differences are noise
+FEWEST_PAIRS = 10  # pairs of segments at a lag that an autocorrelation needs
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What the torque that a model lacks depends on: its average over bins of each signal, what any law could explain."""
+"""Missing torque of a model: its average over bins of each signal, and the share that any law could explain."""
 
 from __future__ import annotations
 

@@ -89,7 +89,7 @@ class Comparison:
 
     @cached_property
     def cross_correlations(self) -> list[CrossCorrelation]:
-        """What the residuals go with, the strongest first."""
+        """Signals that correlate with the residuals, the strongest first."""
         return cross_correlations(self.recording.trials, self.residuals, self.recording.joints)
 
     @property
@@ -118,7 +118,7 @@ def compare_recording(
     seed: int = 0,
     floor: NoiseFloor | None = None,
 ) -> Comparison:
-    """Simulate every trial freely from its start and describe what is left.
+    """Simulate every trial freely from its start and describe the residuals.
 
     A model is simulated with the joint offsets of each initialisation that suit it best; None: the values in
     recording.yaml and no offsets. Steps last `step` [s] at most; None: the usual one, or an eighth of it where the

@@ -119,7 +119,7 @@ class Drift:
             without a clock, a repeat [rad].
         clock: whether time stamps go on from trial to trial.
         tracking: whether it is the error of tracking.
-        repeats: how many tell it.
+        repeats: number of repeats that show it.
     """
 
     joint: str
@@ -201,7 +201,7 @@ def noise_floor(recording: Recording, step_size: Mapping[str, float] | None = No
     sensor = sensor_noise(recording)
     variance = np.maximum(sensor, LEAST) ** 2  # repeats of a simulation differ by less than its sensor's noise
     drift = drifts(recording, groups, sensor)
-    steady = ~np.isin(recording.joints, [one.joint for one in drift])  # where a machine changes repeats tell no noise
+    steady = ~np.isin(recording.joints, [one.joint for one in drift])  # drifting repeats do not show the noise
     if groups:
         variance = np.where(steady, np.maximum(variance, _scatter(groups)), variance)
     return NoiseFloor(
@@ -242,7 +242,7 @@ def sensor_noise(recording: Recording) -> Array:
 
 
 WHOLE, MOSTLY = 0.1, 0.98  # of a step by which a change may miss a multiple of it; share of changes that keep it
-FEWEST_VALUES = 20  # that a signal takes: with fewer gaps chance looks like a step
+FEWEST_VALUES = 20  # distinct values of a signal: with fewer, chance looks like a resolution
 FEW_STEPS = 20  # a larger change is a multiple of any small step, within what its digits tell
 
 

@@ -183,7 +183,7 @@ class Whiteness:
 
 @dataclass(frozen=True)
 class CrossCorrelation:
-    """How much of a residual goes with one signal."""
+    """Correlation of a residual with one signal."""
 
     joint: str  # whose residual
     cause: str  # the signal, in words

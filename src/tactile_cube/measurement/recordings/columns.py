@@ -14,7 +14,7 @@ from tactile_cube.measurement.recordings.tables import Table
 Array = NDArray[np.float64]
 MINIMUM_SAMPLES = 20
 SIGNALS = ("command", "position", "torque", "link_position", "feedforward")
-"""Of a joint; command and position it must have."""
+"""Signals of a joint; command and position are required."""
 OF_SOME = {"link_position": np.nan, "feedforward": 0.0}
 """Signals that some joints may have, and what stands for those of the others."""
 

@@ -16,7 +16,7 @@ from tactile_cube.measurement.recordings.trial import Array, Gains
 
 DEFAULTS = {"stiffness": np.inf}
 DEFAULTS |= dict.fromkeys(("static_friction", "reflected_inertia", "friction_creep", "reading_delay"), 0.0)
-"""What may be stated of a drive, and its value where nothing is."""
+"""Nominal constants of a drive, and their defaults."""
 EFFECTS = {"viscous_friction": "damping"}  # effects that may be stated too, by the value of one parameter
 SLOWER = 0.75  # share of the log's rate that rounding explains
 

@@ -63,12 +63,12 @@ class Rig:
 
     @property
     def gains(self) -> dict[str, Mapping[str, float]]:
-        """What is stated of controllers."""
+        """Stated constants of the controllers."""
         return {key: row for key, row in self.stated.items() if key in CONTROLLER}
 
     @property
     def nominal(self) -> dict[str, Mapping[str, float]]:
-        """What is stated of the rest of the drives."""
+        """Other stated constants of the drives."""
         return {key: row for key, row in self.stated.items() if key not in CONTROLLER}
 
     def understood(self, joints: Sequence[str]) -> Iterator[tuple[str, str, str]]:

@@ -19,7 +19,7 @@ from tactile_cube.untrusted_file import read_npz, regular
 NUMBER = re.compile(r"[-+]?[\d.,]+([eE][-+]?\d+)?")
 VALUE = re.compile(r"[-+]?\d[\d.,:/ T-]*([eE][-+]?\d+)?Z?|[-+]?(nan|inf)", re.IGNORECASE)
 PACKED = (b"\x1f\x8b", b"\x28\xb5\x2f\xfd", b"\x78\x01", b"\x78\x5e", b"\x78\x9c", b"\x78\xda")
-"""How gzip, zstd and zlib begin, which the reader of CSV would unpack whatever comes of it."""
+"""First bytes of gzip, zstd and zlib files, which the CSV reader would unpack without a limit."""
 LOOKED_AT = 100  # lines
 ALIKE = 5  # rows below a header that must have as many fields
 UNIT = 12  # letters of a unit at most
@@ -127,7 +127,7 @@ ADVICE = {
     ".mcap": "use record source=mcap", ".h5": "write its arrays as NPZ", ".hdf5": "write its arrays as NPZ",
     ".pkl": "is a program and not read; write its arrays as NPZ", ".npy": "write its columns as CSV or NPZ",
 }  # fmt: skip
-"""What to do with files that are not read."""
+"""Advice on file types that are not read."""
 
 
 def unknown_ending(path: Path, known: str) -> InputError:

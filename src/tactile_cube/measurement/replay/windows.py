@@ -156,7 +156,7 @@ def cut(
 def between_steps(trials: Sequence[Trial], rows: int, time: float = 1.0) -> int:
     """Return a segment's length, within a tenth of `rows`, with which fewest segments begin as a command has jumped.
 
-    Commands often jump at round times. What a drive does just then, above all within a gap, no measured start knows.
+    Commands often jump at round times. A measured start does not show what a drive does then, least within a gap.
     """
     lengths = np.arange(rows - round(ABOUT * rows), rows + round(ABOUT * rows) + 1)
     jumped = np.zeros(len(lengths))

@@ -1,4 +1,4 @@
-"""Logs of another program as a recording; what is not said of them is guessed, and told, and doubted."""
+"""Import logs of another program; what is not stated is guessed, printed and checked."""
 
 import re
 from collections import Counter
@@ -57,7 +57,7 @@ ASIDE = ("words", "left out", "array", "list column")
 
 
 class LoggedController(Strict):
-    """What is said of the controller that made the logs."""
+    """Stated constants of the controller that made the logs."""
 
     kp: PerJoint | None = None
     kd: PerJoint | None = None
@@ -312,7 +312,7 @@ def _doubts(
     """Yield doubts about units and gains; a torque that agrees with the controller's law needs no other proof."""
     try:
         gains = gains_of(description, None, "controller")
-    except ValueError:  # which is said when the recording is read
+    except ValueError:  # reported when the recording is read
         return
     first = trials[0]
     signals = TrialColumns(first.time, first.command, first.position, first.torque)

@@ -27,7 +27,7 @@ def estimated_gains(
     """Estimate kp [N m/rad], kd [N m s/rad] and reflected_inertia [kg m^2] of each joint.
 
     Least squares with coefficients that are not negative: the error of the loop is (M dv + g(q) + J dv + kd v +
-    friction) / kp. Without weight or inertia of the links nothing tells kp, and a rotor as heavy as they is assumed.
+    friction) / kp. Without weight or inertia of the links kp is not identifiable; a rotor as heavy as they is assumed.
     `told` is the part of the error (0 .. 1) that the links explain.
     """
     try:

@@ -18,10 +18,10 @@ from tactile_cube.measurement.sources.column_map import time_of
 from tactile_cube.untrusted_file import below, read_npz, read_text, regular
 
 Step = tuple[str, str]
-"""What was done to a log, and how."""
+"""What was done to a log, and the details."""
 WIDEST = 64  # columns that a list is expanded to; more are pictures
 PERIODS = {"dt": 1.0, "rate": -1.0, "fps": -1.0, "sample_rate": -1.0}
-"""Names of a constant that says how far rows are apart, and the power of it that is seconds."""
+"""Names of a constant that states the time step or rate, and its exponent in the time step."""
 LEROBOT = Path("meta", "info.json")
 """What a LeRobot data set says of its columns, in its folder."""
 MISSING = ("", "nan", "na", "n/a", "null", "none", "-")

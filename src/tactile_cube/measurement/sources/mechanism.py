@@ -123,7 +123,7 @@ def read_servo(name: str) -> Servo:
 
 @dataclass(frozen=True)
 class Mechanism:
-    """What is said of it; conf/source/csv.yaml says what each setting means, and its units."""
+    """Stated mechanism of the logs; conf/source/csv.yaml says what each setting means, and its units."""
 
     urdf: str | None
     robot: str | None
@@ -133,7 +133,7 @@ class Mechanism:
     gain: Positive | None
 
     def rig(self) -> Rig:
-        """Return it, with the servo's constants in the place of what a file states of drives.
+        """Return the rig, with the servo's constants in the place of what a file states of drives.
 
         Raises:
             InputError: neither a file nor a robot, or both; a file, a robot or a servo that cannot be used.
@@ -159,7 +159,7 @@ class Mechanism:
         return replace(rig, stated=stated, stated_by=f"servo {self.servo}", unknown=unknown, doubts=(doubt,))
 
     def sized(self, rig: Rig, trials: Sequence[TrialTable], mode: str, kp: PerJoint | None, gravity: float) -> Rig:
-        """Return it with the masses that logs show under gravity [m/s^2] where nobody says them."""
+        """Return the mechanism with the masses that logs show under gravity [m/s^2] where none are stated."""
         if self.robot is None:
             return rig
         said = with_stated({"kp": kp}, rig.gains, [self.robot]).get("kp")

@@ -75,7 +75,7 @@ def rate_of(time: NDArray[np.float64], digits: int, where: str) -> float:
 
 
 def source_settings(option: str, given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the settings of `record source=OPTION` with others in their place, which no configuration interprets."""
+    """Return the settings of `record source=OPTION`, overridden by those given, which Hydra does not interpret."""
     settings = dict(_shipped(option))
     for key, value in given.items():
         old = settings.get(key)

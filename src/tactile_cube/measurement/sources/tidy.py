@@ -1,4 +1,4 @@
-"""Logs as people have them, made into trials: topics, files, episodes, equal rows, gaps, torque switched off."""
+"""Cut logs into trials: topics, files, episodes, equal rows, gaps, torque switched off."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace

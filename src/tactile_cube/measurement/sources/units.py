@@ -1,4 +1,4 @@
-"""In which unit a column is: what the user says, or its name, or its values."""
+"""Unit of a column, from the user, its name or its values."""
 
 import json
 import re
@@ -61,7 +61,7 @@ class Unit:
     size: float  # in SI units
     source: str  # where the unit was found
     zero: float = 0.0  # the reading that is zero
-    doubt: str = ""  # what nothing proves
+    doubt: str = ""  # what is assumed without proof
 
     @property
     def said(self) -> bool:
@@ -115,7 +115,7 @@ def position_unit(
     in which `spans` (motor -> [rad]) or else the joint's limits are -100 .. 100 (0 .. 100 of a gripper).
 
     Raises:
-        InputError: no such unit, or ticks of which nothing tells how many a turn has.
+        InputError: no such unit, or ticks whose number a turn is unknown.
     """
     if said == RANGE:
         return _share(name, joint, spans)
@@ -212,7 +212,7 @@ def geared(
 ) -> dict[str, Unit]:
     """Return units of what is logged on the motor's side of a gear, as the motor's and the link's angle tell them.
 
-    Commands are on the motor's side where they reach that far, torques where their column says so. `said`: turns of
+    Commands are on the motor's side if their range fits it, torques if their column's name says so. `said`: turns of
     the motor a turn of its link, if the user says them.
     """
     angles = [signal for signal in units if units[signal].name not in {*TORQUE_UNITS, *FORCE_UNITS}]
