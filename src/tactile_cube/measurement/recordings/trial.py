@@ -48,33 +48,21 @@ def load_of(held: HeldObject, grasp: Grasp) -> Load:
 
 @dataclass(frozen=True, kw_only=True)
 class Trial(TrialColumns):
-    """One trial at uniform time steps from 0; `command[k]` acts from `time[k]` to `time[k + 1]`.
+    """One trial at uniform time steps from 0; `command[k]` acts from `time[k]` to `time[k + 1]`."""
 
-    Attributes:
-        name: file name without its ending.
-        file: path inside the recording's folder.
-        kind: kind of excitation; trials of one kind repeat one command.
-        initialisation: robot initialisation it belongs to; each has joint offsets of its own.
-        valid: (n,) False where a sample counts in no error: it was interpolated, or follows commands before the log.
-        gains: the controller in this trial.
-        force: a known force on a link, or None.
-        clamped: the links were held still.
-        touch: the link ended at a known place, or None.
-        load: the object that the hand held, or None.
-        begun: when it began, from the start of its initialisation [s]; 0 where the stamps of its file do not tell.
-    """
-
-    name: str
-    file: str
-    kind: str
-    initialisation: int
+    name: str  # file name without its ending
+    file: str  # path inside the recording's folder
+    kind: str  # kind of excitation; trials of one kind repeat one command
+    initialisation: int  # robot initialisation it belongs to; each has joint offsets of its own
+    # (n,) False where a sample counts in no error: it was interpolated, or follows commands before the log
     valid: NDArray[np.bool_]
-    gains: Gains
-    force: KnownForce | None = None
-    clamped: bool = False
-    touch: Touch | None = None
+    gains: Gains  # the controller in this trial
+    force: KnownForce | None = None  # a known force on a link
+    clamped: bool = False  # the links were held still
+    touch: Touch | None = None  # the link ended at a known place
     warnings: tuple[str, ...] = field(default=(), repr=False)
-    load: Load | None = None
+    load: Load | None = None  # the object that the hand held
+    # when it began, from the start of its initialisation [s]; 0 where the stamps of its file do not tell
     begun: float = 0.0
 
     @property

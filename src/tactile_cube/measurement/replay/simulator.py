@@ -55,17 +55,11 @@ class Simulated:
 
 @dataclass(frozen=True)
 class Path:
-    """A model's way through windows, with the equations of motion along it, for its neighbours to follow.
+    """A model's way through windows, with the equations of motion along it, for its neighbours to follow."""
 
-    Attributes:
-        position: what a log would show of the model, (S, K segment, sensors) [rad].
-        mechanics: what the equations of motion depend on.
-        steps: (S, T width) of every window, see `steps.free_step`.
-    """
-
-    position: Array
-    mechanics: Array
-    steps: Array
+    position: Array  # what a log would show of the model, (S, K segment, sensors) [rad]
+    mechanics: Array  # what the equations of motion depend on
+    steps: Array  # (S, T width) of every window, see `steps.free_step`
 
 
 def free_run(recording: Recording, model: Model, step: float = 0.002) -> list[Simulated]:

@@ -35,64 +35,41 @@ MANY = 12  # samples around a start that suffice for a polynomial of fourth degr
 
 @dataclass(frozen=True)
 class Windows:
-    """S windows of K segments of `segment` rows each; n joints; M sensors: the motors', then those on links.
+    """S windows of K segments of `segment` rows each; n joints; M sensors: the motors', then those on links."""
 
-    Attributes:
-        commands: (S, (H + K segment) substeps, n) what each step takes, after `history` rows of the past [rad].
-        held: (S, H + K segment, n) what each row's steps end with [rad].
-        measured: (S, K segment, M) measured positions [rad].
-        jump: (S, K segment, n) command of the step at each reading less the one that the log feels: half the change of
-            the command, or of what the torque reaches [rad].
-        weight: (S, K segment, M) 1 / sensor noise; 0 where nothing was measured [1/rad].
-        position: (S, K, n) measured position at each segment's start, under the mean command of the jump there [rad].
-        speed: (S, K, n) [rad/s].
-        acceleration: (S, K, n) measured at each segment's start, a gauge of how well the speed is known [rad/s^2].
-        start_noise: (S, K, 2 n) what sensor noise makes of positions [rad] and speeds [rad/s] at segments' starts.
-        gains: (S, 3, n) kp, kd and torque limit of the trial over those of the recording.
-        trial: (S,) index of the trial.
-        initialisation: (S,) robot initialisation.
-        time: (S,) of the first row in its trial [s].
-        begun: (S,) when the trial began, from the start of its initialisation [s].
-        clamped: (S,) the links were held still.
-        initial_state: (S, 2 n) how far links stand from where their sensors put them as the window begins [rad], and
-            how much faster they are [rad/s]; see `initial_states`.
-        balanced: (S, n) friction's bristles balance the load as the window begins; they are unbent otherwise.
-        trial_start: (S, 3, n) position, command [rad] and speed [rad/s] of the trial's first step.
-        wound: (S, n) what the integral of a controller holds beyond balance as the trial begins [N m].
-        errors: of each window, (rows before it, 2, n): errors of the trial's position times the sampling step [rad s],
-            and how far it moved [rad].
-        forces: known forces on a link, or None.
-        joint_of: (M,) joint that each sensor belongs to.
-        history: H.
-        segment: rows of a segment.
-        substeps: simulation steps from row to row.
-    """
-
-    commands: Array
-    held: Array
-    measured: Array
+    commands: Array  # (S, (H + K segment) substeps, n) what each step takes, after `history` rows of the past [rad]
+    held: Array  # (S, H + K segment, n) what each row's steps end with [rad]
+    measured: Array  # (S, K segment, M) measured positions [rad]
+    # (S, K segment, n) command of the step at each reading less the one that the log feels: half the change of the
+    # command, or of what the torque reaches [rad]
     jump: Array
-    weight: Array
+    weight: Array  # (S, K segment, M) 1 / sensor noise; 0 where nothing was measured [1/rad]
+    # (S, K, n) measured position at each segment's start, under the mean command of the jump there [rad]
     position: Array
-    speed: Array
-    acceleration: Array
-    start_noise: Array
-    gains: Array
-    trial: NDArray[np.int64]
-    initialisation: NDArray[np.int64]
-    time: Array
-    begun: Array
-    clamped: NDArray[np.bool_]
+    speed: Array  # (S, K, n) [rad/s]
+    acceleration: Array  # (S, K, n) measured at each segment's start, a gauge of how well the speed is known [rad/s^2]
+    start_noise: Array  # (S, K, 2 n) what sensor noise makes of positions [rad] and speeds [rad/s] at segments' starts
+    gains: Array  # (S, 3, n) kp, kd and torque limit of the trial over those of the recording
+    trial: NDArray[np.int64]  # (S,) index of the trial
+    initialisation: NDArray[np.int64]  # (S,) robot initialisation
+    time: Array  # (S,) of the first row in its trial [s]
+    begun: Array  # (S,) when the trial began, from the start of its initialisation [s]
+    clamped: NDArray[np.bool_]  # (S,) the links were held still
+    # (S, 2 n) how far links stand from where their sensors put them as the window begins [rad], and how much faster
+    # they are [rad/s]; see `initial_states`
     initial_state: Array
+    # (S, n) friction's bristles balance the load as the window begins; they are unbent otherwise
     balanced: NDArray[np.bool_]
-    trial_start: Array
-    wound: Array
+    trial_start: Array  # (S, 3, n) position, command [rad] and speed [rad/s] of the trial's first step
+    wound: Array  # (S, n) what the integral of a controller holds beyond balance as the trial begins [N m]
+    # of each window, (rows before it, 2, n): errors of the trial's position times the sampling step [rad s], and how
+    # far it moved [rad]
     errors: tuple[Array, ...]
-    forces: tuple[KnownForce | None, ...]
-    joint_of: NDArray[np.int64]
-    history: int
-    segment: int
-    substeps: int
+    forces: tuple[KnownForce | None, ...]  # known forces on a link, or None
+    joint_of: NDArray[np.int64]  # (M,) joint that each sensor belongs to
+    history: int  # H
+    segment: int  # rows of a segment
+    substeps: int  # simulation steps from row to row
 
     @property
     def segments(self) -> int:
