@@ -1,7 +1,5 @@
 """The pictures of a workbench, drawn by Bokeh in the colours of the reports."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -3,8 +3,6 @@
 It needs no browser, and computes only what `compare`, `identify` and `diagnose` compute.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

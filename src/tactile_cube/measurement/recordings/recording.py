@@ -1,11 +1,9 @@
 """What was measured on a rig: its description, the mechanism, the controller and the trials."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,7 +73,7 @@ class Recording:
         control = self.description.controller.rate_hz or self.rate
         return max(1, math.ceil(self.step / longest - 1e-6), round(control / self.rate))
 
-    def with_controller_rate(self, rate: float) -> Recording:
+    def with_controller_rate(self, rate: float) -> Self:
         """Return the recording with a controller that computes its torque at `rate` [Hz]."""
         controller = self.description.controller.model_copy(update={"rate_hz": rate})
         return replace(self, description=self.description.model_copy(update={"controller": controller}))
@@ -116,6 +114,6 @@ class Recording:
         except InputError as error:
             raise InputError(f"{self.rig.path}: {error}") from None
 
-    def with_trials(self, trials: list[Trial] | tuple[Trial, ...]) -> Recording:
+    def with_trials(self, trials: list[Trial] | tuple[Trial, ...]) -> Self:
         """Return the recording with only these trials."""
         return replace(self, trials=tuple(trials))

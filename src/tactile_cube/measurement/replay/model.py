@@ -1,9 +1,8 @@
 """Model of a rig: constants, effects, joint offsets; the nominal one, that of a file, draws from its intervals."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 
@@ -71,7 +70,7 @@ class Model:
     terms: tuple[Term, ...]  # effects in force
     offsets: Mapping[int, Array]  # initialisation -> (n,) true minus measured angle [rad]
 
-    def with_offsets(self, known: Mapping[int, Array]) -> Model:
+    def with_offsets(self, known: Mapping[int, Array]) -> Self:
         """Return the model with these joint offsets [rad] in initialisations for which it has none."""
         return replace(self, offsets={**known, **self.offsets})
 

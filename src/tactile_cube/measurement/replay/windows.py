@@ -1,10 +1,8 @@
 """A recording cut for multiple shooting: windows simulated in one go, made of short segments started anew."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,13 +77,13 @@ class Windows:
     def __len__(self) -> int:
         return len(self.commands)
 
-    def take(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> Windows:
+    def take(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> Self:
         """Return some of the windows."""
         places = [int(k) for k in np.arange(len(self))[chosen]]
         picked: dict[str, Any] = {key: tuple(getattr(self, key)[k] for k in places) for key in ("forces", "errors")}
         return replace(self, **{key: getattr(self, key)[chosen] for key in ROWS}, **picked)
 
-    def first_segments(self) -> Windows:
+    def first_segments(self) -> Self:
         """Return only the first segment of each window."""
         rows = slice(self.segment)
         return replace(

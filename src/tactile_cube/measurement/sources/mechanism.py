@@ -1,7 +1,5 @@
 """The mechanism of logs: a URDF or MJCF, or one joint that nobody describes, sized by its own log, and its servo."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Recordings of a simulated rig: commands, joint offsets, sensor noise, effects that the reader does not know of."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
