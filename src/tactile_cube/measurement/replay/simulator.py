@@ -28,16 +28,8 @@ from tactile_cube.measurement.joint_scales import joint_scales
 from tactile_cube.measurement.recordings.description import KnownForce
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Array, Trial
+from tactile_cube.measurement.replay import read_out
 from tactile_cube.measurement.replay.model import Model
-from tactile_cube.measurement.replay.read_out import (
-    before_steps,
-    free_way,
-    gaps,
-    jump_ratio,
-    read_out,
-    simulated_jumps,
-    spring_ratios,
-)
 from tactile_cube.measurement.replay.windows import SMOOTHING, START_SPEED, Windows, asks_for_much, whole_trials
 
 CLAMPED = 1e9  # [N m] brake torque of a clamped link
@@ -158,7 +150,7 @@ class Simulator:
 
     def gaps(self, model: Model) -> Array:
         """Return the width of the gap in each joint's transmission (n,) [rad]."""
-        return gaps(self.plant, self.memory(model))
+        return read_out.gaps(self.plant, self.memory(model))
 
     def integrating(self, model: Model) -> list[int]:
         """Return the joints whose controller integrates its error."""
@@ -188,21 +180,21 @@ class Simulator:
         if near is not None and (not follows or np.array_equal(near.mechanics, self._mechanics(memory[0]))):
             paths = near.steps
             self.plant.view(memory, "follows" if follows else "needs_weight")[:] = 1.0
-        gap = gaps(self.plant, memory[0])
+        gap = read_out.gaps(self.plant, memory[0])
         ratios = self._jump_ratios(memory, windows)
         limit = self.plant.view(memory, "torque_limit")[:, None].copy()
         rows = np.array([MOTOR_POSITION, TORQUE, COMMAND, POSITION, *([LEAD, LOOP_GAIN] if gap.any() else [])])
         joints = len(self.recording.joints)
         signals = np.zeros((len(windows), out.shape[2] * windows.substeps, len(rows), joints))
         self._play(windows, self._past(model, windows), correction, memory, paths, rows, signals, pool)
-        jump = simulated_jumps(signals[:, :, 2], windows)
-        shown = signals[:, :: windows.substeps]
-        free = free_way(self.plant, memory[:, None], jump, shown[:, :, 4], shown[:, :, 5]) if gap.any() else 0.0
-        ratios = spring_ratios(self.plant, memory[:, None], jump, shown[:, :, 1], ratios)
-        position, torque = read_out(shown[:, :, 0], shown[:, :, 1], jump, ratios, limit, free)
+        jump = read_out.simulated_jumps(signals[:, :, 2], windows)
+        shown, every = signals[:, :: windows.substeps], memory[:, None]
+        free = read_out.free_way(self.plant, every, jump, shown[:, :, 4], shown[:, :, 5]) if gap.any() else 0.0
+        ratios = read_out.spring_ratios(self.plant, every, jump, shown[:, :, 1], ratios)
+        position, torque = read_out.read_out(shown[:, :, 0], shown[:, :, 1], jump, ratios, limit, free)
         far = asks_for_much(jump, self.plant.view(memory, "kp")[:, None], limit)
         if far.any():
-            before, known = before_steps(signals[:, :, :2], windows.segment, windows.substeps)
+            before, known = read_out.before_steps(signals[:, :, :2], windows.segment, windows.substeps)
             far &= known[:, None]
             position, torque = np.where(far, before[:, :, 0], position), np.where(far, before[:, :, 1], torque)
         links = shown[:, :, 3, windows.joint_of[joints:]]
@@ -280,7 +272,7 @@ class Simulator:
         """Return the immediate response of the sensors to a jump of the command, see `jump_ratio`, (S, 1, n) each."""
         first = windows.commands[:, windows.history * windows.substeps]
         _, chosen, which = np.unique(windows.gains, axis=0, return_index=True, return_inverse=True)
-        found = np.array([jump_ratio(self.plant, memory[k], first[k]) for k in chosen])[which.ravel(), :, None]
+        found = np.array([read_out.jump_ratio(self.plant, memory[k], first[k]) for k in chosen])[which.ravel(), :, None]
         return found[:, 0], found[:, 1]
 
     def _links(self, model: Model, windows: Windows) -> Array:
