@@ -1,13 +1,11 @@
 """Scales of a recording's joints, from which bounds, typical sizes and start values follow."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tactile_cube.drivetrain.effects.effect import FINGER, Scales
+from tactile_cube.drivetrain.effects.effect import FINGER, Array, Scales
 from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.measurement.recordings.recording import Recording
 
-Array = NDArray[np.float64]
 OFTEN, USUAL, SELDOM = 0.5, 0.9, 0.999  # quantiles of the torques that a recording asks for
 OUTSIDE = 0.002  # share of the positions beyond either end of the range
 FAST = 0.995  # quantile of the speeds

@@ -6,7 +6,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.measurement.comparing import error, regimes
@@ -14,10 +13,10 @@ from tactile_cube.measurement.comparing.error import ErrorSummary, FailingInterv
 from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor, sensor_noise
 from tactile_cube.measurement.comparing.regimes import CrossCorrelation, Regime, Whiteness
 from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.recordings.trial import Array
 from tactile_cube.measurement.replay.model import Model, draw_model, nominal_model, require_same_joints
 from tactile_cube.measurement.replay.simulator import Simulated, Simulator, free_run
 
-Array = NDArray[np.float64]
 COVER = 0.95  # of the simulations lie in the band
 
 

@@ -9,12 +9,11 @@ from pathlib import Path
 from typing import Literal, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.model_file import Strict
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.comparing.noise_floor import lag_between
-from tactile_cube.measurement.recordings.columns import OF_SOME, SIGNALS, TrialColumns
+from tactile_cube.measurement.recordings.columns import OF_SOME, SIGNALS, Array, TrialColumns
 from tactile_cube.measurement.recordings.consistency import gains_of
 from tactile_cube.measurement.recordings.description import (
     Description,
@@ -35,7 +34,6 @@ from tactile_cube.measurement.sources.mechanism import Mechanism
 from tactile_cube.measurement.sources.source import described, listed, rate_of, with_stated
 from tactile_cube.measurement.sources.tidy import apart, joined, trials_of, without_equal_rows
 
-Array = NDArray[np.float64]
 Value = TypeVar("Value")
 Units = dict[str, dict[str, si.Unit]]
 """Joint -> signal -> unit."""
