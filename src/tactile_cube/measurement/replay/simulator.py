@@ -4,13 +4,12 @@ import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from tactile_cube.compiled import compiled_once
 from tactile_cube.drivetrain import DrivetrainConstants, Plant
@@ -320,33 +319,12 @@ def force_torque(tree: RigidBodyTree, force: KnownForce, position: Array) -> Arr
     """
     if force.joint not in tree.dof_names:
         raise InputError(f"trials: key 'force.joint': '{force.joint}' is not a joint of the rig {list(tree.dof_names)}")
-    dof, frames = tree.dof_names.index(force.joint), link_frames(tree, position)
-    rotation, origin = frames[dof]
-    point, vector = origin + rotation @ np.asarray(force.point), np.asarray(force.vector)
-    torque = np.zeros(len(tree.joint_names))
-    while dof >= 0:
-        rotation, origin = frames[dof]
-        axis = rotation @ tree.axis[dof]
-        lever = axis if tree.prismatic[dof] else np.cross(axis, point - origin)
-        torque[tree.follow[dof]] += tree.ratio[dof] * float(lever @ vector)
-        dof = int(tree.parent[dof])
-    return torque
-
-
-def link_frames(tree: RigidBodyTree, position: Array) -> list[tuple[Array, Array]]:
-    """Return rotation (3, 3) and origin (3,) [m] of every link in the base frame, at actuated `position` (joints,)."""
-    angles = tree.ratio * position[tree.follow] + tree.offset
-    frames: list[tuple[Array, Array]] = []
-    for dof in range(tree.dofs):
-        parent = int(tree.parent[dof])
-        rotation, origin = frames[parent] if parent >= 0 else (np.eye(3), np.zeros(3))
-        placed = rotation @ tree.placement_rotation[dof]
-        origin = origin + rotation @ tree.placement_translation[dof]
-        if tree.prismatic[dof]:
-            frames.append((placed, origin + placed @ tree.axis[dof] * angles[dof]))
-        else:
-            frames.append((placed @ Rotation.from_rotvec(tree.axis[dof] * angles[dof]).as_matrix(), origin))
-    return frames
+    # minus what it takes to hold a unit mass at that point where gravity is the force
+    mass, com = np.zeros(tree.dofs), np.tile(force.point, (tree.dofs, 1))
+    mass[tree.dof_names.index(force.joint)] = 1.0
+    point = replace(tree, mass=mass, com=com, inertia=np.zeros_like(tree.inertia))
+    _, held = point.equations(tree.expand(position), np.zeros(tree.dofs), np.asarray(force.vector))
+    return np.asarray(-tree.coupling.T @ held)
 
 
 def integrating_joints(model: Model, joints: tuple[str, ...]) -> list[int]:
