@@ -32,7 +32,7 @@ def joint_scales(recording: Recording) -> tuple[Scales, ...]:
     often, usual, seldom = (np.maximum(_quantile(torques, q), IDLE * accelerating) for q in (OFTEN, USUAL, SELDOM))
     commanded = [np.abs(np.diff(trial.command, axis=0)) / trial.step for trial in recording.trials]
     command_speed = speeds if recording.torque_controlled else _quantile(commanded, FAST)
-    masses, leaders = _moved_masses(tree), {coupling.joint for coupling in recording.coupled.values()}
+    masses, leaders = _moved_masses(tree), {coupling.joint for coupling in recording.description.coupled.values()}
     own = [tree.dof_names.index(name) for name in tree.joint_names]
     slides = tree.prismatic[own]
     limits = np.full(len(own), np.inf) if recording.torque_controlled else recording.gains.torque_limit

@@ -87,7 +87,8 @@ def recording_section(recording: Recording, model: ModelFile | None) -> Section:
     seconds = sum(trial.duration for trial in recording.trials)
     kinds = ", ".join(dict.fromkeys(trial.kind for trial in recording.trials))
     starts = len({trial.initialisation for trial in recording.trials})
-    coupled = f" (coupled: {', '.join(recording.coupled)})" if recording.coupled else ""
+    followers = recording.description.coupled
+    coupled = f" (coupled: {', '.join(followers)})" if followers else ""
     said = "the values stated in recording.yaml"
     if model is not None:
         effects = ", ".join(one.effect for one in model.effects) or "no added effect"

@@ -235,7 +235,7 @@ def _added(before: Recording, made: RecordingTables, controller: Mapping[str, An
         )
         new.append(replace(table, entry=entry))
     doubts = [*described.doubts, *made.description.doubts]
-    return RecordingTables(described.model_copy(update={"doubts": doubts}), before.urdf, [*old, *new])
+    return RecordingTables(described.model_copy(update={"doubts": doubts}), before.rig.text, [*old, *new])
 
 
 def _in_a_line(what: str, how: str, by: str) -> str:

@@ -3,14 +3,14 @@
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
 from tactile_cube.hand import rigid_body
-from tactile_cube.measurement.recordings.description import Coupling, Description
+from tactile_cube.measurement.recordings.description import Description
 from tactile_cube.measurement.recordings.rig import Rig
 from tactile_cube.measurement.recordings.trial import Array, Gains, Trial
 from tactile_cube.measurement.units import SLIDES, TURNS
@@ -34,11 +34,6 @@ class Recording:
         return self.folder.resolve().name
 
     @property
-    def urdf(self) -> str:
-        """Text of the URDF."""
-        return self.rig.text
-
-    @property
     def joints(self) -> tuple[str, ...]:
         """Actuated joints in column order."""
         return tuple(self.description.joints)
@@ -47,11 +42,6 @@ class Recording:
     def linked(self) -> NDArray[np.int64]:
         """Joints with a sensor on their link in any trial."""
         return np.unique(np.concatenate([trial.linked for trial in self.trials]))
-
-    @property
-    def coupled(self) -> dict[str, Coupling]:
-        """Joints that follow another one."""
-        return self.description.coupled
 
     @property
     def gravity(self) -> Array:
@@ -79,11 +69,6 @@ class Recording:
         return replace(self, description=self.description.model_copy(update={"controller": controller}))
 
     @property
-    def read(self) -> Literal["after", "before"]:
-        """Whether a row shows the state at the end of the period in which its command acted, or at its beginning."""
-        return self.description.sensors.read
-
-    @property
     def torque_controlled(self) -> bool:
         """Whether commands are torques [N m], of a motor's voltage too."""
         return self.description.controller.mode != "position"
@@ -108,9 +93,9 @@ class Recording:
 
     def rigid_body(self) -> rigid_body.RigidBodyTree:
         """Build the mechanism. Raises InputError: the URDF and the joints of recording.yaml define no mechanism."""
-        coupled = {name: rigid_body.Mimic(c.joint, c.ratio, c.offset) for name, c in self.coupled.items()}
+        coupled = {name: rigid_body.Mimic(c.joint, c.ratio, c.offset) for name, c in self.description.coupled.items()}
         try:
-            return rigid_body.RigidBodyTree.from_urdf(self.urdf, self.joints, coupled)
+            return rigid_body.RigidBodyTree.from_urdf(self.rig.text, self.joints, coupled)
         except InputError as error:
             raise InputError(f"{self.rig.path}: {error}") from None
 

@@ -103,7 +103,7 @@ class HandReplay:
         self._world.reset(constants, Start(angles, *place, target=trial.command[0, self._order]))
         rows = min(len(trial.time), round(min(until, trial.duration + trial.step) * self.recording.rate))
         position, torque = np.zeros((2, rows, len(self._order)))
-        before = self.recording.read == "before"
+        before = self.recording.description.sensors.read == "before"
         for k, command in enumerate(trial.command[:rows, self._order]):
             if not before:
                 self._world.step(command)

@@ -196,7 +196,7 @@ def _pieces(recording: Recording, trial: Trial, index: int, sizes: Cut) -> Itera
     measured, seen = _shown(trial, links)
     noise = every[: trial.position.shape[1]]
     fine, jump = _as_simulated(recording, trial, substeps)
-    command, after = _around(_as_positions(recording, trial), recording.read)
+    command, after = _around(_as_positions(recording, trial), recording.description.sensors.read)
     held = np.stack([command, after], axis=1)
     errors = trial.step * (after[:-1] - 0.5 * (trial.position[:-1] + trial.position[1:]))
     errors = np.stack([errors, np.diff(trial.position, axis=0)], axis=1)
@@ -262,7 +262,7 @@ def _as_positions(recording: Recording, trial: Trial) -> Array:
 
 def _as_simulated(recording: Recording, trial: Trial, substeps: int) -> tuple[Array, Array]:
     """Return the commands of a trial's steps (T, substeps, n), and the jump of the command at each reading (T, n)."""
-    before, after = _around(_as_positions(recording, trial), recording.read)
+    before, after = _around(_as_positions(recording, trial), recording.description.sensors.read)
     drive = _drive(recording, trial)
     most = drive.limit / np.maximum(drive.kp, np.finfo(float).tiny)
     jump = 0.5 * np.clip(after - before, -most, most)
