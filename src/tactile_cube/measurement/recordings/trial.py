@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.measurement.recordings.columns import TrialColumns
-from tactile_cube.measurement.recordings.description import Grasp, HeldObject, KnownForce, Touch
+from tactile_cube.measurement.recordings.description import Grasp, KnownForce, Touch
 
 Array = NDArray[np.float64]
 
@@ -19,31 +19,6 @@ class Gains:
     kp: Array
     kd: Array
     torque_limit: Array
-
-
-@dataclass(frozen=True)
-class Load:
-    """The object of a trial in which the hand holds one."""
-
-    size: Array  # edge lengths (3,) [m]
-    mass: float  # [kg]
-    com: Array  # centre of mass from the box's centre, in its frame (3,) [m]
-    position: Array  # of its centre in the rig's base frame at the start (3,) [m]
-    quaternion: Array  # of its orientation there (4,), xyzw
-    released: float  # until when its weight is borne by something else [s]
-
-
-def load_of(held: HeldObject, grasp: Grasp) -> Load:
-    """Return the recording's object with the values that a trial's grasp overrides."""
-    size = held.size if grasp.size is None else grasp.size
-    return Load(
-        size=np.broadcast_to(np.asarray(size, dtype=np.float64), (3,)).copy(),
-        mass=held.mass if grasp.mass is None else grasp.mass,
-        com=np.array(held.com if grasp.com is None else grasp.com, dtype=np.float64),
-        position=np.array(grasp.position, dtype=np.float64),
-        quaternion=np.array(grasp.quaternion, dtype=np.float64),
-        released=grasp.released,
-    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,7 +36,7 @@ class Trial(TrialColumns):
     clamped: bool = False  # the links were held still
     touch: Touch | None = None  # the link ended at a known place
     warnings: tuple[str, ...] = field(default=(), repr=False)
-    load: Load | None = None  # the object that the hand held
+    load: Grasp | None = None  # the object that the hand held, with all that is stated of it
     # when it began, from the start of its initialisation [s]; 0 where the stamps of its file do not tell
     begun: float = 0.0
 

@@ -23,7 +23,7 @@ from tactile_cube.hand import DLR_HAND2, grasp_angles
 from tactile_cube.measurement.bench import KINDS as EXCITATIONS
 from tactile_cube.measurement.recordings.description import Coupling, Description, Grasp, TrialEntry
 from tactile_cube.measurement.recordings.rig import parse_rig
-from tactile_cube.measurement.recordings.trial import Array, load_of
+from tactile_cube.measurement.recordings.trial import Array
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
 from tactile_cube.measurement.replay.hand_replay import ContactModel, HandReplay, to_hand
 from tactile_cube.measurement.replay.model import Model, terms_of
@@ -127,8 +127,8 @@ class _Session:
     def _played(self, entry: TrialEntry, grasp: Grasp, offset: Array) -> TrialTable:
         s, command, recording = self.settings, self._command(entry.kind), self.loaded.recording
         assert recording.description.object is not None
-        load = load_of(recording.description.object, grasp)
-        load.position[:] += self.rng.uniform(-s.placing, s.placing, 3)
+        placed = grasp.position + self.rng.uniform(-s.placing, s.placing, 3)
+        load = grasp.of(recording.description.object).model_copy(update={"position": placed})
         trial = replace(silent_trial(command, recording, entry), torque=None, load=load)
         return s.logged(entry, command, self.loaded.simulate(trial, self.contact, offset), self.rng)
 
