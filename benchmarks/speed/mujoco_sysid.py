@@ -74,7 +74,7 @@ def fit_finger(mujoco: ModuleType, sysid: ModuleType, recording: Recording, step
 
 
 def _spec(mujoco: ModuleType, recording: Recording, step: float) -> Any:
-    spec = mujoco.MjSpec.from_string(recording.urdf)
+    spec = mujoco.MjSpec.from_string(recording.rig.text)
     spec.option.timestep, spec.option.gravity = step, recording.gravity
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_CONTACT

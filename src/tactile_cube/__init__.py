@@ -6,8 +6,6 @@ Each command but `workbench` is a function too, of the same keywords: `train`, `
 slow is imported before it is used.
 """
 
-from __future__ import annotations
-
 import importlib
 import sys
 from types import ModuleType

@@ -28,8 +28,11 @@ if TYPE_CHECKING:
 PIPE_CLOSED = 141  # exit status of a program that writes to a closed pipe, as shells count it: 128 + SIGPIPE
 
 
-def command_line(name: str) -> Callable[[], None]:
-    """Return the command line of a function of `commands`; its configuration is conf/<name>.yaml."""
+def command_line(name: str, module: str = "") -> Callable[[], None]:
+    """Return the command line of a function of `commands`, run where `module` is the program, `__main__`.
+
+    Its configuration is conf/<name>.yaml.
+    """
 
     @quiet_when_nobody_reads()
     def main() -> None:
@@ -39,6 +42,8 @@ def command_line(name: str) -> Callable[[], None]:
         sys.argv = with_recipe(name, sys.argv)
         _run(name)
 
+    if module == "__main__":
+        main()
     return main
 
 

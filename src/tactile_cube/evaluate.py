@@ -2,7 +2,4 @@
 
 from tactile_cube.cli import command_line
 
-main = command_line("evaluate")
-
-if __name__ == "__main__":
-    main()
+main = command_line("evaluate", __name__)

@@ -1,7 +1,6 @@
 """Diagnose a recording from a program: which physical effect does the model lack?"""
 
 import multiprocessing
-import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
@@ -9,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
-from tactile_cube.api.comparison import modelled, opened, opened_or_imported
+from tactile_cube.api.comparison import modelled, opened_or_imported
 from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
 from tactile_cube.drivetrain.effects import catalogue, find_effect
 from tactile_cube.drivetrain.model_file import ModelFile, write_model
@@ -24,7 +23,7 @@ from tactile_cube.measurement.bench import has_free_motion, with_object, without
 from tactile_cube.measurement.comparing.comparison import compare_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import require_same_joints
-from tactile_cube.whole_file import write_json, write_whole, written_together
+from tactile_cube.whole_file import write_json, written_together
 
 SHAPES = 3  # of the missing torque of one joint, best fit first
 
@@ -198,11 +197,10 @@ def each(work: Callable[[T], R], over: Sequence[T], jobs: int = 1) -> Iterator[t
 
 
 class Answered(NamedTuple):
-    """What `diagnose` answered, in plain words and as diagnosis.json has it, and the files that it writes."""
+    """What `diagnose` answered, in plain words and as diagnosis.json has it."""
 
     text: str
     data: dict[str, Any]
-    files: dict[str, bytes]
 
 
 def diagnose_each(
@@ -229,31 +227,13 @@ def diagnose_each(
     folders = {Path(folder).resolve().name: Path(folder) for folder in recordings}
     if len(folders) < len(recordings):
         raise InputError(f"recordings={[str(one) for one in recordings]}: give folders that differ in their last name")
-    sound: list[tuple[str, Recording]] = []
-    for name, folder in folders.items():
-        try:
-            sound.append((name, opened(folder)))
-        except InputError as error:
-            yield folder, error
-    for (name, _), found in each(partial(_diagnosed, settings, Path(out)), sound, jobs):
-        if isinstance(found, InputError):
-            yield folders[name], found
-            continue
-        with written_together(Path(out) / name, "diagnosis.json") as aside:
-            for file, content in found.files.items():
-                write_whole(aside / file, content)
-        yield folders[name], found
+    yield from each(partial(_diagnosed, settings, Path(out)), [*folders.values()], jobs)
 
 
-def _diagnosed(settings: Mapping[str, Any], out: Path, named: tuple[str, Recording]) -> Answered | InputError:
-    name, recording = named
+def _diagnosed(settings: Mapping[str, Any], out: Path, folder: Path) -> Answered | InputError:
     try:
-        found = diagnose(recording, **settings, say=lambda line: None)
+        found = diagnose(folder, **settings, say=lambda line: None)
     except InputError as error:
         return error
-    with tempfile.TemporaryDirectory() as place:
-        found.write(place)
-        files = {path.name: path.read_bytes() for path in Path(place).iterdir()}
-    # its commands name the model where it will be
-    files["report.html"] = files["report.html"].replace(place.encode(), str(out / name).encode())
-    return Answered(found.text, found.data, files)
+    found.write(out / folder.resolve().name)
+    return Answered(found.text, found.data)

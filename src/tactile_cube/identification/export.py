@@ -333,7 +333,7 @@ def as_urdf(model: ModelFile, recording: Recording) -> tuple[str, list[str]]:
     """Return the recording's URDF with <dynamics> and efforts of the model, and what it does not hold, a line each."""
     drives = drives_of(model)
     left = [line for drive in drives for line in drive.not_in(("torque_limit", "friction", "damping"))]
-    robot = robot_of(recording.urdf)
+    robot = robot_of(recording.rig.text)
     by_name = {drive.name: drive for drive in drives}
     for joint in robot.findall("joint"):
         if (drive := by_name.get(str(joint.get("name")))) is None:

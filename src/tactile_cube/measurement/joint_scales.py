@@ -1,13 +1,11 @@
 """Scales of a recording's joints, from which bounds, typical sizes and start values follow."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tactile_cube.drivetrain.effects.effect import FINGER, Scales
+from tactile_cube.drivetrain.effects.effect import FINGER, Array, Scales
 from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.measurement.recordings.recording import Recording
 
-Array = NDArray[np.float64]
 OFTEN, USUAL, SELDOM = 0.5, 0.9, 0.999  # quantiles of the torques that a recording asks for
 OUTSIDE = 0.002  # share of the positions beyond either end of the range
 FAST = 0.995  # quantile of the speeds
@@ -34,7 +32,7 @@ def joint_scales(recording: Recording) -> tuple[Scales, ...]:
     often, usual, seldom = (np.maximum(_quantile(torques, q), IDLE * accelerating) for q in (OFTEN, USUAL, SELDOM))
     commanded = [np.abs(np.diff(trial.command, axis=0)) / trial.step for trial in recording.trials]
     command_speed = speeds if recording.torque_controlled else _quantile(commanded, FAST)
-    masses, leaders = _moved_masses(tree), {coupling.joint for coupling in recording.coupled.values()}
+    masses, leaders = _moved_masses(tree), {coupling.joint for coupling in recording.description.coupled.values()}
     own = [tree.dof_names.index(name) for name in tree.joint_names]
     slides = tree.prismatic[own]
     limits = np.full(len(own), np.inf) if recording.torque_controlled else recording.gains.torque_limit

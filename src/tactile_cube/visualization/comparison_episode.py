@@ -86,7 +86,7 @@ def _in_words(comparison: Comparison) -> str:
 def _log_robot(branch: Branch, comparison: Comparison, starts: list[float]) -> None:
     recording = comparison.recording
     try:
-        tree = log_robot(branch.stream, recording.urdf, "robot")
+        tree = log_robot(branch.stream, recording.rig.text, "robot")
     except Exception as error:  # of a shape that Rerun does not know
         reason = str(error).strip().partition("\n")[0]
         raise InputError(f"{recording.rig.path}: cannot be drawn ({reason}); mend it, or say rerun=false") from None
@@ -94,7 +94,7 @@ def _log_robot(branch: Branch, comparison: Comparison, starts: list[float]) -> N
     time = np.concatenate([start + t.time[::stride] for start, t in zip(starts, recording.trials, strict=True)])
     angles = np.concatenate([trial.position[::stride] for trial in recording.trials])
     moving = {name: angles[:, index] for index, name in enumerate(recording.joints)}
-    for name, coupling in recording.coupled.items():
+    for name, coupling in recording.description.coupled.items():
         moving.setdefault(name, coupling.ratio * moving[coupling.joint] + coupling.offset)
     for joint in tree.joints():
         if joint.name in moving:

@@ -87,7 +87,8 @@ def recording_section(recording: Recording, model: ModelFile | None) -> Section:
     seconds = sum(trial.duration for trial in recording.trials)
     kinds = ", ".join(dict.fromkeys(trial.kind for trial in recording.trials))
     starts = len({trial.initialisation for trial in recording.trials})
-    coupled = f" (coupled: {', '.join(recording.coupled)})" if recording.coupled else ""
+    followers = recording.description.coupled
+    coupled = f" (coupled: {', '.join(followers)})" if followers else ""
     said = "the values stated in recording.yaml"
     if model is not None:
         effects = ", ".join(one.effect for one in model.effects) or "no added effect"
@@ -220,8 +221,9 @@ def method_section() -> Section:
         "Just after a reversal: within 0.2 s after a joint's velocity changed its sign. Standstill, low, medium and "
         "high speed: below 0.02, 0.3, 1.5 rad/s and above (m/s where a joint slides). Low and "
         "high load: below and above half of the largest torque.",
-        "Whiteness: Ljung-Box test over 20 lags. Cross-correlation: the strongest within 0.1 s; its p-value allows "
-        "for the autocorrelation of both signals.",
+        "Correlation time: until the autocorrelation of a joint's error falls below 1/e, on average over the trials. "
+        "Correlation with other signals: the strongest within 0.1 s; its p-value allows for the autocorrelation of "
+        "both.",
     ]
     return Section("How this was computed", (), [Listing(lines)], folded=True)
 

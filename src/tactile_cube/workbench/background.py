@@ -1,7 +1,5 @@
 """`diagnose` in a process of its own, so that it can be watched and stopped at any time."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import re

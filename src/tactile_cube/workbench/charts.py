@@ -1,7 +1,5 @@
 """The pictures of a workbench, drawn by Bokeh in the colours of the reports."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -9,19 +7,17 @@ import numpy as np
 from bokeh import models
 from bokeh.events import Tap
 from bokeh.plotting import figure
-from numpy.typing import NDArray
 
 from tactile_cube.identification.next_experiment import Experiment
 from tactile_cube.identification.search.residual_shape import Missing
 from tactile_cube.measurement.comparing.comparison import Comparison
 from tactile_cube.measurement.comparing.error import residuals
-from tactile_cube.measurement.recordings.trial import Trial
+from tactile_cube.measurement.recordings.trial import Array, Trial
 from tactile_cube.measurement.units import SMALL, TURNS, named, shown
 from tactile_cube.visualization.charts import BEFORE, ERROR, FAILING, FLOOR, GRID, MEASURED, PALETTE, SIMULATED
 from tactile_cube.workbench.missing_torque import curve
 from tactile_cube.workbench.text import label, plain
 
-Array = NDArray[np.float64]
 Points = Sequence[Any] | Array
 TOOLS = "xpan,xwheel_zoom,box_zoom,reset,save"
 POINTS, DRAWN = 1500, 20_000  # samples of the missing torque, and of a trial, that are drawn at most

@@ -1,7 +1,5 @@
 """What all windows of a workbench share: the state, the logs that wait to be imported, and what is running."""
 
-from __future__ import annotations
-
 import sys
 import traceback
 from collections.abc import Callable, Sequence

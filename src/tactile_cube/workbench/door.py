@@ -1,7 +1,5 @@
 """Server of the page: its secret address, access control, and what a browser may do with the page."""
 
-from __future__ import annotations
-
 import secrets
 from importlib import resources
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The form by which logs are imported: first rows, which column is what, and what is known of the rig."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Logs of other programs on their way into a workbench: what is in them, how they are read, what is odd about them."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os
@@ -9,7 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from tactile_cube.api.job import as_input_errors
 from tactile_cube.errors import InputError
@@ -65,7 +63,7 @@ class Waiting:
     robot: str | None = None  # pendulum, wheel or slide in its place
     calibration: Path | None = None  # LeRobot's, of the arm
 
-    def with_files(self, files: Sequence[Path]) -> Waiting:
+    def with_files(self, files: Sequence[Path]) -> Self:
         """Return it with more files, each by what it is; new logs take the place of old ones."""
         of = {kind: [file for file in files if kind_of(file) == kind] for kind in ("log", "rig", "calibration")}
         changed = replace(
@@ -237,7 +235,7 @@ def _added(before: Recording, made: RecordingTables, controller: Mapping[str, An
         )
         new.append(replace(table, entry=entry))
     doubts = [*described.doubts, *made.description.doubts]
-    return RecordingTables(described.model_copy(update={"doubts": doubts}), before.urdf, [*old, *new])
+    return RecordingTables(described.model_copy(update={"doubts": doubts}), before.rig.text, [*old, *new])
 
 
 def _in_a_line(what: str, how: str, by: str) -> str:

@@ -1,7 +1,5 @@
 """The torque that a model lacks, over the signal of a candidate: averaged in windows that hide the encoder's steps."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """One window of a workbench: it shows the state and passes clicks on, and computes nothing."""
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """The numbers of a model that a fit may change, and what their user fixes or bounds."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

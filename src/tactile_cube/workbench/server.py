@@ -1,7 +1,5 @@
 """The command: a workbench for one user of one machine, until Ctrl-C or SIGTERM."""
 
-from __future__ import annotations
-
 import contextlib
 import logging
 import os

@@ -3,14 +3,11 @@
 It needs no browser, and computes only what `compare`, `identify` and `diagnose` compute.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_cube.api.comparison import modelled, opened
 from tactile_cube.api.job import PathLike, as_input_errors
@@ -37,7 +34,7 @@ from tactile_cube.measurement.comparing.comparison import USUAL_STEP, Comparison
 from tactile_cube.measurement.comparing.error import ErrorSummary
 from tactile_cube.measurement.comparing.noise_floor import noise_floor, noise_with_links
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.recordings.trial import Trial
+from tactile_cube.measurement.recordings.trial import Array, Trial
 from tactile_cube.measurement.replay.model import Model, effect_path, nominal_model
 from tactile_cube.measurement.replay.simulator import Simulated, free_run
 from tactile_cube.measurement.split import held_out_split, with_test_part
@@ -47,7 +44,6 @@ from tactile_cube.workbench.background import Diagnosing, Found
 from tactile_cube.workbench.missing_torque import missing_torque
 from tactile_cube.workbench.parameters import BoundedSearch, Value
 
-Array = NDArray[np.float64]
 STATED, REFITTED, BY_HAND = "stated", "refitted", "by hand"
 BEGUN = 2  # stages of a model to which nothing was added: stated, refitted
 AT_ONCE = 24  # candidates that are screened before checking whether other work waits

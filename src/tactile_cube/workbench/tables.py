@@ -1,7 +1,5 @@
 """What a workbench says in tables and cards: the error by stage, the test of what is left, an effect."""
 
-from __future__ import annotations
-
 from importlib import resources
 from itertools import pairwise
 

@@ -4,11 +4,9 @@ What is not printable (controls, NUL, right-to-left marks, halves of surrogates)
 escaped, and no TeX is rendered: the page has no MathJax, and labels of charts are plain text by their type.
 """
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, Self
 
 from bokeh.models import Axis, Div, MultiSelect, PlainText, Select
 from markupsafe import Markup
@@ -30,9 +28,9 @@ class Html(Markup):
     """HTML that this package wrote; what `format` and `join` put into it is escaped, unless it is of this kind."""
 
     @classmethod
-    def escape(cls, s: Any, /) -> Html:
+    def escape(cls, s: Any, /) -> Self:
         """Return a value as HTML that shows it."""
-        return s if isinstance(s, Html) else cls(Markup.escape(plain(s, MESSAGE)))
+        return s if isinstance(s, cls) else cls(Markup.escape(plain(s, MESSAGE)))
 
 
 def html(*parts: str) -> Html:

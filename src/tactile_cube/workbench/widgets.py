@@ -1,7 +1,5 @@
 """Widgets of a window: rows, texts, fields, selects, buttons."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

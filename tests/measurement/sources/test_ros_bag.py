@@ -41,7 +41,7 @@ def test_a_bag_becomes_a_recording_by_joint_names(bag: Path, tmp_path: Path) -> 
     recording = read_recording(tmp_path / "r")
     trial = recording.trials[0]
     assert recording.rate == pytest.approx(100.0)
-    assert recording.read == "before"
+    assert recording.description.sensors.read == "before"
     assert np.allclose(trial.position[:, 0], table()["a.position"], atol=1e-6)
     assert np.allclose(trial.command[:, 1], table()["b.command"], atol=1e-6)
     assert trial.torque is not None

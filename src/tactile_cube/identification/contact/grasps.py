@@ -126,7 +126,7 @@ class Grasp:
         return np.concatenate([grip[::EVERY].ravel() / LEFT, np.sqrt(ALIKE) * unknown / self.spread])
 
     def _simulate(self, contact: ContactModel, unknown: Array, rows: int) -> Array:
-        moved = replace(self._load, position=self._load.position + unknown[-3:])
+        moved = self._load.model_copy(update={"position": self._load.position + unknown[-3:]})
         trial = replace(self.trial, load=moved)
         return self._replay.simulate(trial, contact, unknown[:-3], rows * self.trial.step).position
 

@@ -6,26 +6,17 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.model_file import ModelFile
-from tactile_cube.measurement.comparing import error
+from tactile_cube.measurement.comparing import error, regimes
 from tactile_cube.measurement.comparing.error import ErrorSummary, FailingInterval, summarise_errors
 from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor, sensor_noise
-from tactile_cube.measurement.comparing.regimes import (
-    CrossCorrelation,
-    Regime,
-    Whiteness,
-    cross_correlations,
-    regimes,
-    where_it_fails,
-    whiteness,
-)
+from tactile_cube.measurement.comparing.regimes import CrossCorrelation, Regime, Whiteness
 from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.recordings.trial import Array
 from tactile_cube.measurement.replay.model import Model, draw_model, nominal_model, require_same_joints
 from tactile_cube.measurement.replay.simulator import Simulated, Simulator, free_run
 
-Array = NDArray[np.float64]
 COVER = 0.95  # of the simulations lie in the band
 
 
@@ -90,7 +81,7 @@ class Comparison:
     @cached_property
     def cross_correlations(self) -> list[CrossCorrelation]:
         """Signals that correlate with the residuals, the strongest first."""
-        return cross_correlations(self.recording.trials, self.residuals, self.recording.joints)
+        return regimes.cross_correlations(self.recording.trials, self.residuals, self.recording.joints)
 
     @property
     def ratio(self) -> float:
@@ -172,7 +163,7 @@ def describe_comparison(
     trials, joints, positions = recording.trials, recording.joints, [one.position for one in simulated]
     errors, raw = error.residuals(trials, positions), error.raw_residuals(trials, positions)
     summary = summarise_errors(errors, joints)
-    table = regimes(trials, errors, joints)
+    table = regimes.regimes(trials, errors, joints)
     return Comparison(
         recording=recording,
         model=model,
@@ -185,10 +176,10 @@ def describe_comparison(
         floor=floor,
         regimes=table,
         sentences=[
-            *where_it_fails(table, summary.joints, floor, recording.shown),
+            *regimes.where_it_fails(table, summary.joints, floor, recording.shown),
             *(one.sentence(recording.shown[one.joint]) for one in floor.drift),
         ],
-        whiteness=whiteness(trials, errors, joints),
+        whiteness=regimes.whiteness(trials, errors, joints),
         failing_intervals=[
             interval
             for trial, one in zip(trials, errors, strict=True)

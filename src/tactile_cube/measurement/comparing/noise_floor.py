@@ -111,22 +111,15 @@ FEWEST_REPEATS = 3
 
 @dataclass(frozen=True)
 class Drift:
-    """How much better or worse a joint follows the same command from repeat to repeat.
-
-    Attributes:
-        joint: its name.
-        change: of the RMS error of tracking, or where torques are commanded of the RMS motion, a minute; of a recording
-            without a clock, a repeat [rad].
-        clock: whether time stamps go on from trial to trial.
-        tracking: whether it is the error of tracking.
-        repeats: number of repeats that show it.
-    """
+    """How much better or worse a joint follows the same command from repeat to repeat."""
 
     joint: str
+    # of the RMS error of tracking, or where torques are commanded of the RMS motion, a minute; of a recording without a
+    # clock, a repeat [rad]
     change: float
-    clock: bool
-    tracking: bool
-    repeats: int
+    clock: bool  # whether time stamps go on from trial to trial
+    tracking: bool  # whether it is the error of tracking
+    repeats: int  # that show it
 
     def sentence(self, unit: str) -> str:
         """Say it in words; `unit` of the position: rad or m."""

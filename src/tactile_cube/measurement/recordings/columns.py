@@ -21,22 +21,15 @@ OF_SOME = {"link_position": np.nan, "feedforward": 0.0}
 
 @dataclass(frozen=True)
 class TrialColumns:
-    """What was commanded and measured; `sensors.read` of the recording says when `position[k]` was read.
+    """What was commanded and measured; `sensors.read` of the recording says when `position[k]` was read."""
 
-    Attributes:
-        time: (n,) [s].
-        command: (n, joints) desired position [rad] ([N m] where the controller's mode is `torque`).
-        position: (n, joints) measured position, on the motor side [rad].
-        torque: (n, joints) measured torque [N m], or None.
-        link_position: (n, joints) measured on the link side [rad], nan where a joint has no sensor there; or None.
-        feedforward: (n, joints) torque that the controller added to its own [N m], acting like `command`; or None.
-    """
-
-    time: Array
-    command: Array
-    position: Array
-    torque: Array | None = None
+    time: Array  # (n,) [s]
+    command: Array  # (n, joints) desired position [rad] ([N m] where the controller's mode is `torque`)
+    position: Array  # (n, joints) measured position, on the motor side [rad]
+    torque: Array | None = None  # (n, joints) measured torque [N m]
+    # (n, joints) measured on the link side [rad], nan where a joint has no sensor there; or None
     link_position: Array | None = None
+    # (n, joints) torque that the controller added to its own [N m], acting like `command`; or None
     feedforward: Array | None = None
 
 

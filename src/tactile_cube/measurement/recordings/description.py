@@ -1,7 +1,7 @@
 """What recording.yaml may say: the rig, its controller, the values its owner believes, and the trials."""
 
 from collections import Counter
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,6 +101,10 @@ class Grasp(Strict):
         if not any(self.quaternion):
             raise ValueError("quaternion is zero, which is no orientation; [0, 0, 0, 1] is the base frame's")
         return self
+
+    def of(self, held: HeldObject) -> Self:
+        """Return the grasp of the recording's object, with its values where none differ."""
+        return self.model_copy(update={key: value for key, value in held if getattr(self, key) is None})
 
 
 class TrialEntry(Strict):

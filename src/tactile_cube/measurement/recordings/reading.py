@@ -25,7 +25,7 @@ from tactile_cube.measurement.recordings.description import Description, TrialEn
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.rig import Rig, parse_rig
 from tactile_cube.measurement.recordings.tables import read_table
-from tactile_cube.measurement.recordings.trial import Trial, load_of
+from tactile_cube.measurement.recordings.trial import Trial
 from tactile_cube.untrusted_file import below, read_text
 
 DESCRIPTION = "recording.yaml"
@@ -113,7 +113,7 @@ def _trial(path: Path, most: int, entry: TrialEntry, description: Description, r
         valid=valid,
         gains=gains,
         warnings=tuple(warnings + time_warnings + single),
-        load=load_of(description.object, entry.object) if description.object and entry.object else None,
+        load=entry.object.of(description.object) if description.object and entry.object else None,
         begun=float(columns.time[0]),
     )
 

@@ -1,18 +1,16 @@
 """What was measured on a rig: its description, the mechanism, the controller and the trials."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
 from tactile_cube.hand import rigid_body
-from tactile_cube.measurement.recordings.description import Coupling, Description
+from tactile_cube.measurement.recordings.description import Description
 from tactile_cube.measurement.recordings.rig import Rig
 from tactile_cube.measurement.recordings.trial import Array, Gains, Trial
 from tactile_cube.measurement.units import SLIDES, TURNS
@@ -36,11 +34,6 @@ class Recording:
         return self.folder.resolve().name
 
     @property
-    def urdf(self) -> str:
-        """Text of the URDF."""
-        return self.rig.text
-
-    @property
     def joints(self) -> tuple[str, ...]:
         """Actuated joints in column order."""
         return tuple(self.description.joints)
@@ -49,11 +42,6 @@ class Recording:
     def linked(self) -> NDArray[np.int64]:
         """Joints with a sensor on their link in any trial."""
         return np.unique(np.concatenate([trial.linked for trial in self.trials]))
-
-    @property
-    def coupled(self) -> dict[str, Coupling]:
-        """Joints that follow another one."""
-        return self.description.coupled
 
     @property
     def gravity(self) -> Array:
@@ -75,15 +63,10 @@ class Recording:
         control = self.description.controller.rate_hz or self.rate
         return max(1, math.ceil(self.step / longest - 1e-6), round(control / self.rate))
 
-    def with_controller_rate(self, rate: float) -> Recording:
+    def with_controller_rate(self, rate: float) -> Self:
         """Return the recording with a controller that computes its torque at `rate` [Hz]."""
         controller = self.description.controller.model_copy(update={"rate_hz": rate})
         return replace(self, description=self.description.model_copy(update={"controller": controller}))
-
-    @property
-    def read(self) -> Literal["after", "before"]:
-        """Whether a row shows the state at the end of the period in which its command acted, or at its beginning."""
-        return self.description.sensors.read
 
     @property
     def torque_controlled(self) -> bool:
@@ -110,12 +93,12 @@ class Recording:
 
     def rigid_body(self) -> rigid_body.RigidBodyTree:
         """Build the mechanism. Raises InputError: the URDF and the joints of recording.yaml define no mechanism."""
-        coupled = {name: rigid_body.Mimic(c.joint, c.ratio, c.offset) for name, c in self.coupled.items()}
+        coupled = {name: rigid_body.Mimic(c.joint, c.ratio, c.offset) for name, c in self.description.coupled.items()}
         try:
-            return rigid_body.RigidBodyTree.from_urdf(self.urdf, self.joints, coupled)
+            return rigid_body.RigidBodyTree.from_urdf(self.rig.text, self.joints, coupled)
         except InputError as error:
             raise InputError(f"{self.rig.path}: {error}") from None
 
-    def with_trials(self, trials: list[Trial] | tuple[Trial, ...]) -> Recording:
+    def with_trials(self, trials: list[Trial] | tuple[Trial, ...]) -> Self:
         """Return the recording with only these trials."""
         return replace(self, trials=tuple(trials))

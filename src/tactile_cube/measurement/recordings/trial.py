@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.measurement.recordings.columns import TrialColumns
-from tactile_cube.measurement.recordings.description import Grasp, HeldObject, KnownForce, Touch
+from tactile_cube.measurement.recordings.description import Grasp, KnownForce, Touch
 
 Array = NDArray[np.float64]
 
@@ -21,60 +21,23 @@ class Gains:
     torque_limit: Array
 
 
-@dataclass(frozen=True)
-class Load:
-    """The object of a trial in which the hand holds one."""
-
-    size: Array  # edge lengths (3,) [m]
-    mass: float  # [kg]
-    com: Array  # centre of mass from the box's centre, in its frame (3,) [m]
-    position: Array  # of its centre in the rig's base frame at the start (3,) [m]
-    quaternion: Array  # of its orientation there (4,), xyzw
-    released: float  # until when its weight is borne by something else [s]
-
-
-def load_of(held: HeldObject, grasp: Grasp) -> Load:
-    """Return the recording's object with the values that a trial's grasp overrides."""
-    size = held.size if grasp.size is None else grasp.size
-    return Load(
-        size=np.broadcast_to(np.asarray(size, dtype=np.float64), (3,)).copy(),
-        mass=held.mass if grasp.mass is None else grasp.mass,
-        com=np.array(held.com if grasp.com is None else grasp.com, dtype=np.float64),
-        position=np.array(grasp.position, dtype=np.float64),
-        quaternion=np.array(grasp.quaternion, dtype=np.float64),
-        released=grasp.released,
-    )
-
-
 @dataclass(frozen=True, kw_only=True)
 class Trial(TrialColumns):
-    """One trial at uniform time steps from 0; `command[k]` acts from `time[k]` to `time[k + 1]`.
+    """One trial at uniform time steps from 0; `command[k]` acts from `time[k]` to `time[k + 1]`."""
 
-    Attributes:
-        name: file name without its ending.
-        file: path inside the recording's folder.
-        kind: kind of excitation; trials of one kind repeat one command.
-        initialisation: robot initialisation it belongs to; each has joint offsets of its own.
-        valid: (n,) False where a sample counts in no error: it was interpolated, or follows commands before the log.
-        gains: the controller in this trial.
-        force: a known force on a link, or None.
-        clamped: the links were held still.
-        touch: the link ended at a known place, or None.
-        load: the object that the hand held, or None.
-        begun: when it began, from the start of its initialisation [s]; 0 where the stamps of its file do not tell.
-    """
-
-    name: str
-    file: str
-    kind: str
-    initialisation: int
+    name: str  # file name without its ending
+    file: str  # path inside the recording's folder
+    kind: str  # kind of excitation; trials of one kind repeat one command
+    initialisation: int  # robot initialisation it belongs to; each has joint offsets of its own
+    # (n,) False where a sample counts in no error: it was interpolated, or follows commands before the log
     valid: NDArray[np.bool_]
-    gains: Gains
-    force: KnownForce | None = None
-    clamped: bool = False
-    touch: Touch | None = None
+    gains: Gains  # the controller in this trial
+    force: KnownForce | None = None  # a known force on a link
+    clamped: bool = False  # the links were held still
+    touch: Touch | None = None  # the link ended at a known place
     warnings: tuple[str, ...] = field(default=(), repr=False)
-    load: Load | None = None
+    load: Grasp | None = None  # the object that the hand held, with all that is stated of it
+    # when it began, from the start of its initialisation [s]; 0 where the stamps of its file do not tell
     begun: float = 0.0
 
     @property

@@ -99,11 +99,12 @@ class HandReplay:
         constants = contact.apply(replace(self._nominal, **held))
         measured = trial.position[:START].mean(axis=0)
         twist = (trial.gains.kp * (trial.command[0] - measured))[self._order] / np.asarray(constants.stiffness)
-        angles, place = (measured - offset)[self._order] - twist, to_world(self.hand, load.position, load.quaternion)
+        angles = (measured - offset)[self._order] - twist
+        place = to_world(self.hand, np.asarray(load.position), np.asarray(load.quaternion))
         self._world.reset(constants, Start(angles, *place, target=trial.command[0, self._order]))
         rows = min(len(trial.time), round(min(until, trial.duration + trial.step) * self.recording.rate))
         position, torque = np.zeros((2, rows, len(self._order)))
-        before = self.recording.read == "before"
+        before = self.recording.description.sensors.read == "before"
         for k, command in enumerate(trial.command[:rows, self._order]):
             if not before:
                 self._world.step(command)

@@ -1,9 +1,8 @@
 """Model of a rig: constants, effects, joint offsets; the nominal one, that of a file, draws from its intervals."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 
@@ -32,20 +31,13 @@ def effect_label(effect: EffectClass, joint: str) -> str:
 
 @dataclass(frozen=True)
 class Term:
-    """An effect at a joint with values for all its parameters.
-
-    Attributes:
-        effect: its class.
-        joint: where it acts.
-        values: of all its parameters.
-        fitted: those that a fit may change.
-        expected: of a fitted one, what is known of it beforehand: centre and standard deviation.
-    """
+    """An effect at a joint with values for all its parameters."""
 
     effect: EffectClass
-    joint: str
-    values: Mapping[str, float]
-    fitted: tuple[str, ...] = ()
+    joint: str  # where it acts
+    values: Mapping[str, float]  # of all its parameters
+    fitted: tuple[str, ...] = ()  # those that a fit may change
+    # of a fitted one, what is known of it beforehand: centre and standard deviation
     expected: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
@@ -69,21 +61,16 @@ def terms_of(effects: Iterable[tuple[str, Mapping[str, float]]], joints: tuple[s
 
 @dataclass(frozen=True)
 class Model:
-    """What a simulation of a rig needs beside its URDF.
+    """What a simulation of a rig needs beside its URDF."""
 
-    Attributes:
-        constants: kp, kd, torque_limit, stiffness, static_friction, reflected_inertia, friction_creep (how fast a
-            sticking joint gives way, rad/s per N m) and reading_delay (how old a position is when its row is logged, s;
-            negative: younger), each (n,).
-        terms: effects in force.
-        offsets: initialisation -> (n,) true minus measured angle [rad].
-    """
-
+    # kp, kd, torque_limit, stiffness, static_friction, reflected_inertia, friction_creep (how fast a sticking joint
+    # gives way, rad/s per N m) and reading_delay (how old a position is when its row is logged, s; negative: younger),
+    # each (n,)
     constants: Mapping[str, Array]
-    terms: tuple[Term, ...]
-    offsets: Mapping[int, Array]
+    terms: tuple[Term, ...]  # effects in force
+    offsets: Mapping[int, Array]  # initialisation -> (n,) true minus measured angle [rad]
 
-    def with_offsets(self, known: Mapping[int, Array]) -> Model:
+    def with_offsets(self, known: Mapping[int, Array]) -> Self:
         """Return the model with these joint offsets [rad] in initialisations for which it has none."""
         return replace(self, offsets={**known, **self.offsets})
 

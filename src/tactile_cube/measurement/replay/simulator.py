@@ -4,13 +4,12 @@ import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from tactile_cube.compiled import compiled_once
 from tactile_cube.drivetrain import DrivetrainConstants, Plant
@@ -28,16 +27,8 @@ from tactile_cube.measurement.joint_scales import joint_scales
 from tactile_cube.measurement.recordings.description import KnownForce
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Array, Trial
+from tactile_cube.measurement.replay import read_out
 from tactile_cube.measurement.replay.model import Model
-from tactile_cube.measurement.replay.read_out import (
-    before_steps,
-    free_way,
-    gaps,
-    jump_ratio,
-    read_out,
-    simulated_jumps,
-    spring_ratios,
-)
 from tactile_cube.measurement.replay.windows import SMOOTHING, START_SPEED, Windows, asks_for_much, whole_trials
 
 CLAMPED = 1e9  # [N m] brake torque of a clamped link
@@ -55,17 +46,11 @@ class Simulated:
 
 @dataclass(frozen=True)
 class Path:
-    """A model's way through windows, with the equations of motion along it, for its neighbours to follow.
+    """A model's way through windows, with the equations of motion along it, for its neighbours to follow."""
 
-    Attributes:
-        position: what a log would show of the model, (S, K segment, sensors) [rad].
-        mechanics: what the equations of motion depend on.
-        steps: (S, T width) of every window, see `steps.free_step`.
-    """
-
-    position: Array
-    mechanics: Array
-    steps: Array
+    position: Array  # what a log would show of the model, (S, K segment, sensors) [rad]
+    mechanics: Array  # what the equations of motion depend on
+    steps: Array  # (S, T width) of every window, see `steps.free_step`
 
 
 def free_run(recording: Recording, model: Model, step: float = 0.002) -> list[Simulated]:
@@ -164,7 +149,7 @@ class Simulator:
 
     def gaps(self, model: Model) -> Array:
         """Return the width of the gap in each joint's transmission (n,) [rad]."""
-        return gaps(self.plant, self.memory(model))
+        return read_out.gaps(self.plant, self.memory(model))
 
     def integrating(self, model: Model) -> list[int]:
         """Return the joints whose controller integrates its error."""
@@ -194,21 +179,21 @@ class Simulator:
         if near is not None and (not follows or np.array_equal(near.mechanics, self._mechanics(memory[0]))):
             paths = near.steps
             self.plant.view(memory, "follows" if follows else "needs_weight")[:] = 1.0
-        gap = gaps(self.plant, memory[0])
+        gap = read_out.gaps(self.plant, memory[0])
         ratios = self._jump_ratios(memory, windows)
         limit = self.plant.view(memory, "torque_limit")[:, None].copy()
         rows = np.array([MOTOR_POSITION, TORQUE, COMMAND, POSITION, *([LEAD, LOOP_GAIN] if gap.any() else [])])
         joints = len(self.recording.joints)
         signals = np.zeros((len(windows), out.shape[2] * windows.substeps, len(rows), joints))
         self._play(windows, self._past(model, windows), correction, memory, paths, rows, signals, pool)
-        jump = simulated_jumps(signals[:, :, 2], windows)
-        shown = signals[:, :: windows.substeps]
-        free = free_way(self.plant, memory[:, None], jump, shown[:, :, 4], shown[:, :, 5]) if gap.any() else 0.0
-        ratios = spring_ratios(self.plant, memory[:, None], jump, shown[:, :, 1], ratios)
-        position, torque = read_out(shown[:, :, 0], shown[:, :, 1], jump, ratios, limit, free)
+        jump = read_out.simulated_jumps(signals[:, :, 2], windows)
+        shown, every = signals[:, :: windows.substeps], memory[:, None]
+        free = read_out.free_way(self.plant, every, jump, shown[:, :, 4], shown[:, :, 5]) if gap.any() else 0.0
+        ratios = read_out.spring_ratios(self.plant, every, jump, shown[:, :, 1], ratios)
+        position, torque = read_out.read_out(shown[:, :, 0], shown[:, :, 1], jump, ratios, limit, free)
         far = asks_for_much(jump, self.plant.view(memory, "kp")[:, None], limit)
         if far.any():
-            before, known = before_steps(signals[:, :, :2], windows.segment, windows.substeps)
+            before, known = read_out.before_steps(signals[:, :, :2], windows.segment, windows.substeps)
             far &= known[:, None]
             position, torque = np.where(far, before[:, :, 0], position), np.where(far, before[:, :, 1], torque)
         links = shown[:, :, 3, windows.joint_of[joints:]]
@@ -286,7 +271,7 @@ class Simulator:
         """Return the immediate response of the sensors to a jump of the command, see `jump_ratio`, (S, 1, n) each."""
         first = windows.commands[:, windows.history * windows.substeps]
         _, chosen, which = np.unique(windows.gains, axis=0, return_index=True, return_inverse=True)
-        found = np.array([jump_ratio(self.plant, memory[k], first[k]) for k in chosen])[which.ravel(), :, None]
+        found = np.array([read_out.jump_ratio(self.plant, memory[k], first[k]) for k in chosen])[which.ravel(), :, None]
         return found[:, 0], found[:, 1]
 
     def _links(self, model: Model, windows: Windows) -> Array:
@@ -334,33 +319,12 @@ def force_torque(tree: RigidBodyTree, force: KnownForce, position: Array) -> Arr
     """
     if force.joint not in tree.dof_names:
         raise InputError(f"trials: key 'force.joint': '{force.joint}' is not a joint of the rig {list(tree.dof_names)}")
-    dof, frames = tree.dof_names.index(force.joint), link_frames(tree, position)
-    rotation, origin = frames[dof]
-    point, vector = origin + rotation @ np.asarray(force.point), np.asarray(force.vector)
-    torque = np.zeros(len(tree.joint_names))
-    while dof >= 0:
-        rotation, origin = frames[dof]
-        axis = rotation @ tree.axis[dof]
-        lever = axis if tree.prismatic[dof] else np.cross(axis, point - origin)
-        torque[tree.follow[dof]] += tree.ratio[dof] * float(lever @ vector)
-        dof = int(tree.parent[dof])
-    return torque
-
-
-def link_frames(tree: RigidBodyTree, position: Array) -> list[tuple[Array, Array]]:
-    """Return rotation (3, 3) and origin (3,) [m] of every link in the base frame, at actuated `position` (joints,)."""
-    angles = tree.ratio * position[tree.follow] + tree.offset
-    frames: list[tuple[Array, Array]] = []
-    for dof in range(tree.dofs):
-        parent = int(tree.parent[dof])
-        rotation, origin = frames[parent] if parent >= 0 else (np.eye(3), np.zeros(3))
-        placed = rotation @ tree.placement_rotation[dof]
-        origin = origin + rotation @ tree.placement_translation[dof]
-        if tree.prismatic[dof]:
-            frames.append((placed, origin + placed @ tree.axis[dof] * angles[dof]))
-        else:
-            frames.append((placed @ Rotation.from_rotvec(tree.axis[dof] * angles[dof]).as_matrix(), origin))
-    return frames
+    # minus what it takes to hold a unit mass at that point where gravity is the force
+    mass, com = np.zeros(tree.dofs), np.tile(force.point, (tree.dofs, 1))
+    mass[tree.dof_names.index(force.joint)] = 1.0
+    point = replace(tree, mass=mass, com=com, inertia=np.zeros_like(tree.inertia))
+    _, held = point.equations(tree.expand(position), np.zeros(tree.dofs), np.asarray(force.vector))
+    return np.asarray(-tree.coupling.T @ held)
 
 
 def integrating_joints(model: Model, joints: tuple[str, ...]) -> list[int]:

@@ -1,10 +1,8 @@
 """A recording cut for multiple shooting: windows simulated in one go, made of short segments started anew."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,64 +33,41 @@ MANY = 12  # samples around a start that suffice for a polynomial of fourth degr
 
 @dataclass(frozen=True)
 class Windows:
-    """S windows of K segments of `segment` rows each; n joints; M sensors: the motors', then those on links.
+    """S windows of K segments of `segment` rows each; n joints; M sensors: the motors', then those on links."""
 
-    Attributes:
-        commands: (S, (H + K segment) substeps, n) what each step takes, after `history` rows of the past [rad].
-        held: (S, H + K segment, n) what each row's steps end with [rad].
-        measured: (S, K segment, M) measured positions [rad].
-        jump: (S, K segment, n) command of the step at each reading less the one that the log feels: half the change of
-            the command, or of what the torque reaches [rad].
-        weight: (S, K segment, M) 1 / sensor noise; 0 where nothing was measured [1/rad].
-        position: (S, K, n) measured position at each segment's start, under the mean command of the jump there [rad].
-        speed: (S, K, n) [rad/s].
-        acceleration: (S, K, n) measured at each segment's start, a gauge of how well the speed is known [rad/s^2].
-        start_noise: (S, K, 2 n) what sensor noise makes of positions [rad] and speeds [rad/s] at segments' starts.
-        gains: (S, 3, n) kp, kd and torque limit of the trial over those of the recording.
-        trial: (S,) index of the trial.
-        initialisation: (S,) robot initialisation.
-        time: (S,) of the first row in its trial [s].
-        begun: (S,) when the trial began, from the start of its initialisation [s].
-        clamped: (S,) the links were held still.
-        initial_state: (S, 2 n) how far links stand from where their sensors put them as the window begins [rad], and
-            how much faster they are [rad/s]; see `initial_states`.
-        balanced: (S, n) friction's bristles balance the load as the window begins; they are unbent otherwise.
-        trial_start: (S, 3, n) position, command [rad] and speed [rad/s] of the trial's first step.
-        wound: (S, n) what the integral of a controller holds beyond balance as the trial begins [N m].
-        errors: of each window, (rows before it, 2, n): errors of the trial's position times the sampling step [rad s],
-            and how far it moved [rad].
-        forces: known forces on a link, or None.
-        joint_of: (M,) joint that each sensor belongs to.
-        history: H.
-        segment: rows of a segment.
-        substeps: simulation steps from row to row.
-    """
-
-    commands: Array
-    held: Array
-    measured: Array
+    commands: Array  # (S, (H + K segment) substeps, n) what each step takes, after `history` rows of the past [rad]
+    held: Array  # (S, H + K segment, n) what each row's steps end with [rad]
+    measured: Array  # (S, K segment, M) measured positions [rad]
+    # (S, K segment, n) command of the step at each reading less the one that the log feels: half the change of the
+    # command, or of what the torque reaches [rad]
     jump: Array
-    weight: Array
+    weight: Array  # (S, K segment, M) 1 / sensor noise; 0 where nothing was measured [1/rad]
+    # (S, K, n) measured position at each segment's start, under the mean command of the jump there [rad]
     position: Array
-    speed: Array
-    acceleration: Array
-    start_noise: Array
-    gains: Array
-    trial: NDArray[np.int64]
-    initialisation: NDArray[np.int64]
-    time: Array
-    begun: Array
-    clamped: NDArray[np.bool_]
+    speed: Array  # (S, K, n) [rad/s]
+    acceleration: Array  # (S, K, n) measured at each segment's start, a gauge of how well the speed is known [rad/s^2]
+    start_noise: Array  # (S, K, 2 n) what sensor noise makes of positions [rad] and speeds [rad/s] at segments' starts
+    gains: Array  # (S, 3, n) kp, kd and torque limit of the trial over those of the recording
+    trial: NDArray[np.int64]  # (S,) index of the trial
+    initialisation: NDArray[np.int64]  # (S,) robot initialisation
+    time: Array  # (S,) of the first row in its trial [s]
+    begun: Array  # (S,) when the trial began, from the start of its initialisation [s]
+    clamped: NDArray[np.bool_]  # (S,) the links were held still
+    # (S, 2 n) how far links stand from where their sensors put them as the window begins [rad], and how much faster
+    # they are [rad/s]; see `initial_states`
     initial_state: Array
+    # (S, n) friction's bristles balance the load as the window begins; they are unbent otherwise
     balanced: NDArray[np.bool_]
-    trial_start: Array
-    wound: Array
+    trial_start: Array  # (S, 3, n) position, command [rad] and speed [rad/s] of the trial's first step
+    wound: Array  # (S, n) what the integral of a controller holds beyond balance as the trial begins [N m]
+    # of each window, (rows before it, 2, n): errors of the trial's position times the sampling step [rad s], and how
+    # far it moved [rad]
     errors: tuple[Array, ...]
-    forces: tuple[KnownForce | None, ...]
-    joint_of: NDArray[np.int64]
-    history: int
-    segment: int
-    substeps: int
+    forces: tuple[KnownForce | None, ...]  # known forces on a link, or None
+    joint_of: NDArray[np.int64]  # (M,) joint that each sensor belongs to
+    history: int  # H
+    segment: int  # rows of a segment
+    substeps: int  # simulation steps from row to row
 
     @property
     def segments(self) -> int:
@@ -102,13 +77,13 @@ class Windows:
     def __len__(self) -> int:
         return len(self.commands)
 
-    def take(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> Windows:
+    def take(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> Self:
         """Return some of the windows."""
         places = [int(k) for k in np.arange(len(self))[chosen]]
         picked: dict[str, Any] = {key: tuple(getattr(self, key)[k] for k in places) for key in ("forces", "errors")}
         return replace(self, **{key: getattr(self, key)[chosen] for key in ROWS}, **picked)
 
-    def first_segments(self) -> Windows:
+    def first_segments(self) -> Self:
         """Return only the first segment of each window."""
         rows = slice(self.segment)
         return replace(
@@ -221,7 +196,7 @@ def _pieces(recording: Recording, trial: Trial, index: int, sizes: Cut) -> Itera
     measured, seen = _shown(trial, links)
     noise = every[: trial.position.shape[1]]
     fine, jump = _as_simulated(recording, trial, substeps)
-    command, after = _around(_as_positions(recording, trial), recording.read)
+    command, after = _around(_as_positions(recording, trial), recording.description.sensors.read)
     held = np.stack([command, after], axis=1)
     errors = trial.step * (after[:-1] - 0.5 * (trial.position[:-1] + trial.position[1:]))
     errors = np.stack([errors, np.diff(trial.position, axis=0)], axis=1)
@@ -287,7 +262,7 @@ def _as_positions(recording: Recording, trial: Trial) -> Array:
 
 def _as_simulated(recording: Recording, trial: Trial, substeps: int) -> tuple[Array, Array]:
     """Return the commands of a trial's steps (T, substeps, n), and the jump of the command at each reading (T, n)."""
-    before, after = _around(_as_positions(recording, trial), recording.read)
+    before, after = _around(_as_positions(recording, trial), recording.description.sensors.read)
     drive = _drive(recording, trial)
     most = drive.limit / np.maximum(drive.kp, np.finfo(float).tiny)
     jump = 0.5 * np.clip(after - before, -most, most)

@@ -9,12 +9,11 @@ from pathlib import Path
 from typing import Literal, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.model_file import Strict
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.comparing.noise_floor import lag_between
-from tactile_cube.measurement.recordings.columns import OF_SOME, SIGNALS, TrialColumns
+from tactile_cube.measurement.recordings.columns import OF_SOME, SIGNALS, Array, TrialColumns
 from tactile_cube.measurement.recordings.consistency import gains_of
 from tactile_cube.measurement.recordings.description import (
     Description,
@@ -27,28 +26,16 @@ from tactile_cube.measurement.recordings.description import (
 from tactile_cube.measurement.recordings.plausibility import torque_over_law
 from tactile_cube.measurement.recordings.rig import Rig, RigJoint
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable, cut_trial
+from tactile_cube.measurement.sources import units as si
 from tactile_cube.measurement.sources.column_map import ColumnMap, map_columns
 from tactile_cube.measurement.sources.gains import estimated_gains, gain_doubts
 from tactile_cube.measurement.sources.log_file import Log, read_logs
 from tactile_cube.measurement.sources.mechanism import Mechanism
 from tactile_cube.measurement.sources.source import described, listed, rate_of, with_stated
 from tactile_cube.measurement.sources.tidy import apart, joined, trials_of, without_equal_rows
-from tactile_cube.measurement.sources.units import (
-    RANGE,
-    Unit,
-    calibrated_spans,
-    geared,
-    is_flag,
-    position_unit,
-    same_unit,
-    time_unit,
-    torque_unit,
-    voltage_unit,
-)
 
-Array = NDArray[np.float64]
 Value = TypeVar("Value")
-Units = dict[str, dict[str, Unit]]
+Units = dict[str, dict[str, si.Unit]]
 """Joint -> signal -> unit."""
 SHOWN = 3  # steps of one kind
 REMEMBERED = 0.4  # [s] by which a drive has forgotten earlier commands, but for a rate limit
@@ -115,7 +102,7 @@ class CsvFiles(Mechanism):
         whole = _each(lambda log: [_checked(log, columns)], logs, left)
         stamps = None
         if columns.time is not None:
-            stamps = time_unit(self.time_unit, _label(whole[0], columns.time), whole[0].table[columns.time])
+            stamps = si.time_unit(self.time_unit, _label(whole[0], columns.time), whole[0].table[columns.time])
         second = stamps.size if stamps is not None else 1.0
         pieces = _each(lambda log: trials_of(log, columns, second, mode == "free"), whole, left)
         units = self._units(pieces, columns, rig.joints)
@@ -168,7 +155,7 @@ class CsvFiles(Mechanism):
 
     def _columns(self, log: Log, rig: Rig) -> ColumnMap:
         joints = [name for name, joint in rig.joints.items() if joint.mimics is None]
-        flags = [name for name, values in log.table.items() if is_flag(values)]
+        flags = [name for name, values in log.table.items() if si.is_flag(values)]
         try:
             columns = map_columns(list(log.table), joints, self.columns or {}, self.controller.mode, flags)
         except InputError as error:
@@ -187,8 +174,9 @@ class CsvFiles(Mechanism):
 
     def _units(self, logs: Sequence[Log], columns: ColumnMap, joints: Mapping[str, RigJoint]) -> Units:
         units: Units = {}
-        mode, spans = self.controller.mode, {} if self.calibration is None else calibrated_spans(Path(self.calibration))
-        if spans and self.angle_unit not in (RANGE, "deg"):
+        mode = self.controller.mode
+        spans = {} if self.calibration is None else si.calibrated_spans(Path(self.calibration))
+        if spans and self.angle_unit not in (si.RANGE, "deg"):
             raise InputError(f"source.calibration={self.calibration}: say source.angle_unit=range (or deg) beside it")
         for name, entry in columns.joints.items():
             if name not in joints:
@@ -199,17 +187,17 @@ class CsvFiles(Mechanism):
             for signal, column in entry.items():
                 label = _label(logs[0], column)
                 if signal == "command" and mode == "voltage":
-                    found[signal] = voltage_unit(label, self.controller.motor[0])
+                    found[signal] = si.voltage_unit(label, self.controller.motor[0])
                 elif signal in ("torque", "feedforward") or (mode == "torque" and signal == "command"):
-                    found[signal] = torque_unit(self.torque_unit, label, joint.prismatic, values[signal])
+                    found[signal] = si.torque_unit(self.torque_unit, label, joint.prismatic, values[signal])
                 else:
-                    found[signal] = position_unit(said, label, values[signal], joint, spans)
+                    found[signal] = si.position_unit(said, label, values[signal], joint, spans)
             spread = float(np.ptp(values["command"])) if mode == "position" else 0.0
             if spread > 0:
                 ratio = float(np.ptp(values["position"])) / spread
-                found["command"], found["position"] = same_unit(found["command"], found["position"], ratio)
+                found["command"], found["position"] = si.same_unit(found["command"], found["position"], ratio)
             if "link_position" in entry:
-                found |= geared(found, values, entry, self.gear)
+                found |= si.geared(found, values, entry, self.gear)
         return units
 
     def _named(
@@ -340,7 +328,7 @@ def _steps(logs: Sequence[Log]) -> Iterator[tuple[str, str, str]]:
         yield what, "; ".join(hows[:SHOWN]) + (f"; and {len(hows) - SHOWN} more" if len(hows) > SHOWN else ""), ""
 
 
-def _rows(columns: ColumnMap, units: Units, stamps: Unit | None, rate: float) -> Iterator[tuple[str, str, str]]:
+def _rows(columns: ColumnMap, units: Units, stamps: si.Unit | None, rate: float) -> Iterator[tuple[str, str, str]]:
     if stamps is not None:
         yield "time", f"{columns.time} [{stamps.name}], {rate:g} Hz", stamps.source
     for joint, entry in columns.joints.items():

@@ -3,16 +3,14 @@
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from tactile_cube import limits
 from tactile_cube.errors import InputError
 from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.measurement.recordings.rig import Rig
-from tactile_cube.measurement.recordings.writing import TrialTable
+from tactile_cube.measurement.recordings.writing import Array, TrialTable
 
-Array = NDArray[np.float64]
 WINDOW = 0.05  # [s] over which a velocity is taken
 MOST, FEWEST = 600, 20  # samples of all trials, of one trial
 FOUND = ("kp", "kd", "reflected_inertia", "told")

@@ -1,13 +1,10 @@
 """The mechanism of logs: a URDF or MJCF, or one joint that nobody describes, sized by its own log, and its servo."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_cube.composition import CONFIG, suggestion
 from tactile_cube.drivetrain.model_file import Strict
@@ -19,7 +16,6 @@ from tactile_cube.measurement.recordings.writing import TrialTable
 from tactile_cube.measurement.sources.gains import motion_of, nonnegative_fit, resistance
 from tactile_cube.measurement.sources.source import with_stated
 
-Array = NDArray[np.float64]
 ROBOTS = {
     "pendulum": "turns about a level axis and has a weight",
     "wheel": "turns, and gravity does nothing",

@@ -8,20 +8,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_cube import limits
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.description import PerJoint, Rate, TrialEntry
 from tactile_cube.measurement.recordings.rig import read_rig
-from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
+from tactile_cube.measurement.recordings.writing import Array, RecordingTables, TrialTable
 from tactile_cube.measurement.sources.source import described, listed, rate_of, with_stated
 from tactile_cube.untrusted_file import regular
 
 if TYPE_CHECKING:
     from mcap.records import Chunk
 
-Array = NDArray[np.float64]
 SAME_STAMP = 1e-6  # [s]
 
 

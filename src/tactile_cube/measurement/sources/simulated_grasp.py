@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tactile_cube.drivetrain.effects import parse_effect
@@ -24,7 +23,7 @@ from tactile_cube.hand import DLR_HAND2, grasp_angles
 from tactile_cube.measurement.bench import KINDS as EXCITATIONS
 from tactile_cube.measurement.recordings.description import Coupling, Description, Grasp, TrialEntry
 from tactile_cube.measurement.recordings.rig import parse_rig
-from tactile_cube.measurement.recordings.trial import load_of
+from tactile_cube.measurement.recordings.trial import Array
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
 from tactile_cube.measurement.replay.hand_replay import ContactModel, HandReplay, to_hand
 from tactile_cube.measurement.replay.model import Model, terms_of
@@ -33,7 +32,6 @@ from tactile_cube.measurement.sources.simulated_rig import SimulatedSession, sil
 from tactile_cube.simulation.contact_effects import find_any_effect, is_contact_effect
 from tactile_cube.simulation.engine import EngineName
 
-Array = NDArray[np.float64]
 CLEARANCE, RETRACTED = 3e-3, 2e-2  # [m] of open fingertips and of fingers that do not take part, off their faces
 CLOSE, WAIT, CARRY = 0.6, 0.3, 0.3  # [s] to close, until the weight acts, and until the grip loosens
 HOLDING = {"hold": (0, 1, 2, 3), "twist": (1, 3)}  # fingers; middle and thumb oppose each other
@@ -129,8 +127,8 @@ class _Session:
     def _played(self, entry: TrialEntry, grasp: Grasp, offset: Array) -> TrialTable:
         s, command, recording = self.settings, self._command(entry.kind), self.loaded.recording
         assert recording.description.object is not None
-        load = load_of(recording.description.object, grasp)
-        load.position[:] += self.rng.uniform(-s.placing, s.placing, 3)
+        placed = grasp.position + self.rng.uniform(-s.placing, s.placing, 3)
+        load = grasp.of(recording.description.object).model_copy(update={"position": placed})
         trial = replace(silent_trial(command, recording, entry), torque=None, load=load)
         return s.logged(entry, command, self.loaded.simulate(trial, self.contact, offset), self.rng)
 

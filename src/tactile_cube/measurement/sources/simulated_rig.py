@@ -1,13 +1,10 @@
 """Recordings of a simulated rig: commands, joint offsets, sensor noise, effects that the reader does not know of."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects import parse_effect
 from tactile_cube.hand import DLR_HAND2
@@ -16,13 +13,12 @@ from tactile_cube.measurement.bench import BENCH_KINDS, bench_trials, excitation
 from tactile_cube.measurement.recordings.description import Coupling, Description, TrialEntry, per_joint
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.rig import Rig, parse_rig, read_rig
-from tactile_cube.measurement.recordings.trial import Gains, Trial
+from tactile_cube.measurement.recordings.trial import Array, Gains, Trial
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
 from tactile_cube.measurement.replay.model import Model, terms_of
 from tactile_cube.measurement.replay.simulator import Simulated, Simulator
 from tactile_cube.measurement.sources.source import described
 
-Array = NDArray[np.float64]
 BUILT_IN = {"finger": lambda: DLR_HAND2.finger_urdf(0), "hand": DLR_HAND2.urdf}
 OBSTACLE = 500.0  # [N m/rad] stiffness of what a link touches
 SETTLING = 1.0  # [s] at the first command before a trial is logged

@@ -14,7 +14,6 @@ from tactile_cube.measurement.sources.column_map import ColumnMap, time_of
 from tactile_cube.measurement.sources.log_file import Log
 from tactile_cube.measurement.sources.units import words
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 EPISODE = frozenset({"episode", "trial", "run", "segment"})
 COUNTED = frozenset({"index", "id", "idx", "no", "nr", "number"})

@@ -8,13 +8,12 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
+from tactile_cube.measurement.recordings.columns import Array
 from tactile_cube.measurement.recordings.rig import RigJoint
 from tactile_cube.untrusted_file import read_text
 
-Array = NDArray[np.float64]
 Spans = Mapping[str, float]
 WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-zµμ]+|\d+")
 UNITS: dict[str, tuple[str, ...]] = {
