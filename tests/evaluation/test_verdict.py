@@ -118,12 +118,13 @@ def test_a_cube_that_spins_without_fingers_is_flung() -> None:
     np.testing.assert_allclose(free_spin(record), 3.0, atol=0.1)
 
 
-def test_on_a_table_one_finger_may_push() -> None:
+@pytest.mark.parametrize("constants", [{"table_height": -0.04}, {"palm_contact": 1.0}])
+def test_on_a_table_or_in_a_palm_one_finger_may_push(constants: dict[str, float | str]) -> None:
     touch = np.ones((101, 4), dtype=bool)
     touch[:, 1:] = False
-    assert exploits(episode(angle=5.0, touch=touch, constants={"table_height": -0.04})) == []
+    assert exploits(episode(angle=5.0, touch=touch, constants=constants)) == []
     touch[50:, 0] = False
-    assert exploits(episode(angle=5.0, touch=touch, constants={"table_height": -0.04})) == ["flung"]
+    assert exploits(episode(angle=5.0, touch=touch, constants=constants)) == ["flung"]
 
 
 def test_a_tumbled_cube_is_found_unless_it_was_falling() -> None:

@@ -127,7 +127,11 @@ class Recorder:
             ending=OUTCOMES[self._outcome],
             direction=task.task.direction,
             cube_size=np.array(task.constants.cube_size),
-            constants={"seed": float(seed), **_numbers(task.constants)},
+            constants={
+                "seed": float(seed),
+                **_numbers(task.constants),
+                **({"palm_contact": 1.0} if task.hand.palm_contact else {}),
+            },
             fingers=self._fingers,
             object_shape=task.constants.object_shape,
             axis=tuple(task.task.axis_vector().tolist()),

@@ -254,9 +254,10 @@ def integrated_rotation(record: EpisodeRecord) -> Array:
 def free_spin(record: EpisodeRecord) -> float:
     """Return the angle gained in steps that begin and end with a cube that nothing holds [rad].
 
-    In the air it takes two fingers to hold it; on a table one is enough to push it around.
+    In the air it takes two fingers to hold it; on a table or in a palm one is enough to push it around.
     """
-    loose = touching(record).sum(axis=1) < (1 if "table_height" in record.constants else 2)
+    lies = not {"table_height", "palm_contact"}.isdisjoint(record.constants)
+    loose = touching(record).sum(axis=1) < (1 if lies else 2)
     return float(np.sum(np.maximum(np.diff(record.theta)[loose[1:] & loose[:-1]], 0.0)))
 
 
