@@ -33,16 +33,13 @@ if TYPE_CHECKING:
 
 FORMAT = "tactile_cube policy 2"
 NO_DIGEST = b"0" * 64
-KEPT = re.compile(r"policy_(\d+)\.safetensors")
-"""Policies that a run keeps each `training.policy_every` steps."""
+KEPT = re.compile(r"policy_(\d+)\.safetensors")  # policies that a run keeps each `training.policy_every` steps
 LARGEST, LARGEST_HEADER = 1 << 28, 1 << 22
 """Bytes of a file and of its header; the shipped policies have 1.4 million and some thousand."""
 WIDEST, DEEPEST = 1 << 16, 32
-Width = Annotated[int, Field(gt=0, le=WIDEST)]
-"""Number of units of a layer."""
+Width = Annotated[int, Field(gt=0, le=WIDEST)]  # number of units of a layer
 Array = NDArray[np.float32]
-Layer = tuple[Array, Array]
-"""Weight (out, in) and bias (out,)."""
+Layer = tuple[Array, Array]  # weight (out, in) and bias (out,)
 
 
 class PolicyInfo(BaseModel):

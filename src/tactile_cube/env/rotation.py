@@ -27,8 +27,7 @@ from tactile_cube.simulation import EpisodeConstants, World
 
 Array = NDArray[np.float64]
 
-OBJECT = 13
-"""Numbers of the object in what only critics see; q_f follows."""
+OBJECT = 13  # numbers of the object in what only critics see; q_f follows
 LOST = frozenset((DROPPED, LEFT_RANGE, TILTED, LIFTED))
 """Outcomes that end an episode because the cube left the allowed range."""
 

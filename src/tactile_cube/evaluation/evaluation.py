@@ -63,8 +63,7 @@ class VariantResult:
         return "\n".join(lines)
 
 
-SPINNING_FRICTION = "spinning friction [mm]"
-"""The axis whose nominal value is the environment's."""
+SPINNING_FRICTION = "spinning friction [mm]"  # the axis whose nominal value is the environment's
 
 
 class Evaluation:

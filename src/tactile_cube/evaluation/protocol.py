@@ -17,8 +17,7 @@ from tactile_cube.hand import DLR_HAND2, Hand
 from tactile_cube.simulation import EpisodeConstants, SimulationOptions
 from tactile_cube.transforms import EnvConfig
 
-UNCHANGED = "worlds as drawn"
-"""Name of the condition in which worlds and starts stay as drawn."""
+UNCHANGED = "worlds as drawn"  # name of the condition in which worlds and starts stay as drawn
 CHANGEABLE = {"constants": EpisodeConstants, "simulation": SimulationOptions}
 
 

@@ -35,14 +35,10 @@ from tactile_cube.measurement.replay.windows import steps_per_row
 from tactile_cube.measurement.split import held_out_split, with_test_part
 from tactile_cube.measurement.units import common_unit
 
-MOST_INTERVALS = 12
-"""Maximum number of disturbed intervals; each search for more of them repeats the whole diagnosis."""
-NOT_ALL = ("unknown_effect", "partly_explained")
-"""Verdicts that say that more is missing than is named."""
-LESS = (*NOT_ALL, "ambiguous")
-"""Verdicts that do not name everything that is missing, the least informative first."""
-ALL = (len(LESS), True)
-"""Rank of an answer that names everything and leaves little error, see `Answer.says`."""
+MOST_INTERVALS = 12  # maximum number of disturbed intervals; each search for more of them repeats the whole diagnosis
+NOT_ALL = ("unknown_effect", "partly_explained")  # verdicts that say that more is missing than is named
+LESS = (*NOT_ALL, "ambiguous")  # verdicts that do not name everything that is missing, the least informative first
+ALL = (len(LESS), True)  # rank of an answer that names everything and leaves little error, see `Answer.says`
 
 
 class Answer(NamedTuple):

@@ -18,8 +18,7 @@ from tactile_cube.measurement.replay.model import Model, no_offsets
 
 Array = NDArray[np.float64]
 QUANTITIES = ("position", "speed", "torque")
-TRIALS = "trials"
-"""Source of a limit that nobody states: no further, faster or harder than the trials already went."""
+TRIALS = "trials"  # source of a limit that nobody states: no further, faster or harder than the trials already went
 ROUNDING = 1e-9
 FILLER = 1000.0  # times what the trials reached: a number that fills a field of a URDF, such as 1e9, and limits nothing
 

@@ -40,8 +40,7 @@ LONGEST_FITTED = 24.0  # [s] of a finger by the number of joints: enough data fo
 ROUNDS, ITERATIONS = 2, 6  # of the robust weights in windows of one length; Gauss-Newton steps in each
 OUTLYING = 2.0  # robust standard deviations from which on an error counts in proportion, not squared
 NORMAL_MEDIAN = 0.6745  # median of the absolute value of a standard normal number
-Laws = Mapping[str, tuple[str, ...]]
-"""Effect -> parameters that are fitted."""
+Laws = Mapping[str, tuple[str, ...]]  # effect -> parameters that are fitted
 PLAIN: Laws = {
     "torque_gain": ("error",),
     "payload": ("mass",),

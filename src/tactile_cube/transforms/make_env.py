@@ -60,8 +60,7 @@ class OwnGeneratorEnv(TransformedEnv):  # type: ignore[misc]
             self._generator = torch.get_rng_state()
 
 
-ALMOST_ALL = 1.0 - 1e-9
-"""The fraction of draws below what counts as a distribution's largest value."""
+ALMOST_ALL = 1.0 - 1e-9  # the fraction of draws below what counts as a distribution's largest value
 DEEPEST_STACK = 1_000
 PARTS: Mapping[str, tuple[type, ...]] = {
     "task": (Task,),

@@ -16,8 +16,7 @@ from tactile_cube.identification.fitting.unknowns import Unknown
 from tactile_cube.measurement.replay.model import Model, Term
 
 EffectClass = type[Effect]
-Sizes = Mapping[str, Scales]
-"""Joint -> its sizes; a joint that is not there counts as a finger's."""
+Sizes = Mapping[str, Scales]  # joint -> its sizes; a joint that is not there counts as a finger's
 UNKNOWN = (0.0, math.inf)  # centre and standard deviation of a number of which nothing is known
 MOST_SHOWN = 4  # fitted parameters that a label lists
 NO_SIZE = 1e6  # a limit so far off, in the units of a finger, is none

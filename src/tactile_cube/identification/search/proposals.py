@@ -39,8 +39,7 @@ LEAVE_LEAST, CHEAPEST = 3, 2  # pairs that are refitted: with the smallest predi
 CLOSE = 2.5  # ratio of squared errors up to which a full refit may make another law as good as the best
 
 
-Tried = tuple[tuple[Candidate, Fit], ...]
-"""Laws that are added together, each after its own steps."""
+Tried = tuple[tuple[Candidate, Fit], ...]  # laws that are added together, each after its own steps
 
 
 @dataclass(frozen=True)
