@@ -21,7 +21,7 @@ from tactile_cube.identification.search.candidates import first_term
 from tactile_cube.identification.search.evidence import HeldOut, gain, judge, worse
 from tactile_cube.identification.search.explanation import Explanation, Proposal, named, named_by
 from tactile_cube.identification.search.findings import CommonOffset, Findings, common_offsets, find, reached
-from tactile_cube.identification.search.proposals import without
+from tactile_cube.identification.search.proposals import MORE_STEPS, stepped, without
 from tactile_cube.identification.search.search import BestSoFar, Search
 from tactile_cube.identification.standard_model import StandardModel, fit_standard_model
 from tactile_cube.identification.verdict import Simulations, Unexplained, Verdict, decide
@@ -318,7 +318,8 @@ def in_simpler_laws(answer: Answer, verdict: Verdict) -> Verdict:
             continue
         left = without(search, Proposal(chosen.effects, chosen.fit), place)
         parent = search.frozen(left.fit)
-        best, begun = min((search.refit(parent, one) for one in simpler), key=lambda one: one[1].cost)
+        refitted = (stepped(search.problem, parent, one, MORE_STEPS) for one in simpler)
+        best, begun = min(refitted, key=lambda one: one[1].cost)
         tried = Proposal((*left.effects, best), search.refitted(begun.model))
         if not worse((less := search.explained(tried, findings.looked)).judgement, chosen.judgement, search.criteria):
             verdict = instead_of(verdict, less)

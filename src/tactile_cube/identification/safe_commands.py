@@ -230,11 +230,6 @@ class Safety:
         return self.limits.allowed(self.margin)
 
     @property
-    def share_used(self) -> float:
-        """The largest part of what is allowed that is used, in any model."""
-        return share_used(self.reached, self.allowed)
-
-    @property
     def safe(self) -> bool:
         """Whether no model leaves the limits less the margin."""
         return within_limits(self.reached, self.limits, self.margin)

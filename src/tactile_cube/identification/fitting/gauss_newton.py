@@ -57,7 +57,7 @@ def fit(
         problem: the windows to fit.
         model: where to start.
         unknowns: what to fit; with `frozen`, beside its unknowns; none beside them is the chord method.
-        iterations: most steps that are taken.
+        iterations: most steps that are taken; 0 linearises the problem at the model.
         frozen: a fit whose columns are kept as they are, which spares simulating them; they change little.
         converged: relative gain of a step, made or promised, below which the fit ends.
     """
@@ -121,13 +121,6 @@ def noise_inflation(problem: Problem, cost: float) -> float:
     """
     excess = cost / max(float(np.count_nonzero(problem.weight)), 1.0) - 1.0
     return 1.0 + CORRELATED * max(excess, 0.0)
-
-
-def renewed(problem: Problem, fitted: Fit, prediction: Array, columns: Array) -> Fit:
-    """Return a fit with residual, columns and information of a problem whose starts were linearised again."""
-    residual, information = problem.residual(prediction), _information(problem, columns)
-    cost = float(problem.cost(residual).sum())
-    return Fit(fitted.model, fitted.unknowns, cost, fitted.prior_penalty, residual, columns, information)
 
 
 def prior_penalty(model: Model, unknowns: Sequence[Unknown]) -> float:

@@ -73,7 +73,6 @@ def resolved(
     effects: Sequence[type[Effect]],
     say: Callable[[str], None],
     known: ModelFile | None = None,
-    beside: float = 1.0,
 ) -> Recording:
     """Return the recording with the longest simulation steps whose error is hidden by the noise.
 
@@ -86,13 +85,12 @@ def resolved(
         effects: classes to compile in; a search for them reuses their kernel.
         say: receives a line if the steps become shorter or longer.
         known: the model to simulate; None: the values that the recording's owner states.
-        beside: error of the model, relative to which the steps' error is measured [sensor noise].
     """
     noise = noise_with_links(recording)
 
     def error(one: Recording, times: int) -> float:
         start = nominal_model(one, known)
-        return step_error(one, Shooting(one, every_effect(effects, start)), start, noise, times) / max(beside, 1.0)
+        return step_error(one, Shooting(one, every_effect(effects, start)), start, noise, times)
 
     unstated = recording.description.controller.rate_hz is None
     rate = (_shorter if unstated else _longer)(recording, joint_scales(recording)[0].time, error)
@@ -121,16 +119,6 @@ def _longer(recording: Recording, time: float, error: StepError) -> float | None
         else:
             steps *= 2
     return None
-
-
-def stated_error(recording: Recording, effects: Sequence[type[Effect]], known: ModelFile | None = None) -> float:
-    """Return the RMS error [sensor noise] of the initial model on windows spread over the recording."""
-    start = nominal_model(recording, known)
-    shooting = Shooting(recording, every_effect(effects, start))
-    problem = Problem(shooting, spread(shooting.cut(recording, noise_with_links(recording))))
-    problem.linearise_starts(start)
-    residual = problem.residual(problem.predictions([start])[0])
-    return float(np.sqrt(problem.cost(residual).sum() / np.count_nonzero(problem.weight)))
 
 
 def step_error(recording: Recording, shooting: Shooting, model: Model, noise: Array, times: int) -> float:

@@ -37,7 +37,6 @@ class Judgement:
         residual: (G, R) weighted.
         joint_errors: (n,) RMS error of each joint in units of the sensor noise.
         trial: (G,) to which each belongs; segments of one trial follow each other in time.
-        joint_costs: (G, n) part of the squared error that is each joint's; empty where it is not known.
     """
 
     model: Model
@@ -46,7 +45,6 @@ class Judgement:
     residual: Array = field(repr=False)
     joint_errors: Array
     trial: NDArray[np.int64]
-    joint_costs: Array = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
 
     @property
     def error(self) -> float:
@@ -60,10 +58,7 @@ def judge(problem: Problem, held_out: Recording, model: Model) -> Judgement:
     samples = np.count_nonzero(problem.weight, axis=1)
     costs = charged(problem.cost(fitted.residual), samples, problem.chosen_numbers(fitted.model))
     joints = joint_errors(problem, fitted.residual)
-    squares = np.maximum(_joint_squares(problem, fitted.residual)[0], 0.0)
-    shares = squares / np.maximum(squares.sum(axis=1, keepdims=True), np.finfo(float).tiny)
-    trial = problem.segment_trial
-    return Judgement(fitted.model, costs, samples, fitted.residual, joints, trial, costs[:, None] * shares)
+    return Judgement(fitted.model, costs, samples, fitted.residual, joints, problem.segment_trial)
 
 
 def charged(costs: Array, samples: NDArray[np.int64], numbers: NDArray[np.int64]) -> Array:

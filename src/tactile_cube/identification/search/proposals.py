@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects.effect import Stage
 from tactile_cube.identification.criteria import Criteria
-from tactile_cube.identification.fitting.gauss_newton import Fit, fit, noise_inflation, precision, renewed
+from tactile_cube.identification.fitting.gauss_newton import Fit, fit, noise_inflation, precision
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.search.candidates import (
     Candidate,
@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 LOOKED_AT = 4  # part of the segments to judge by, on which every law gets its own steps
 PROMISING = 0.01  # of its joint's squared error: least first-order gain of a law that is fitted
 STEPS = 2  # of Gauss-Newton for each promising law
-MORE_STEPS = 6  # for a law that may be an alternative to a chosen one
+MORE_STEPS = 6  # for a law that is asked for, or that may be an alternative to a chosen one
 LARGER = 2.0  # most that a law is scaled up within a set; its linearisation holds near its own fit
 SINGLES = 4  # laws that are refitted exactly
 LEAVE_LEAST, CHEAPEST = 3, 2  # pairs that are refitted: with the smallest predicted error, with the lowest price
@@ -77,7 +77,7 @@ def look(search: Search, parent: Proposal, at: Sequence[str]) -> Looks:
     """Screen all laws at some joints beside a fitted set, and fit the promising ones."""
     problem = Problem(search.shooting, failing_windows(search, parent.fit))
     problem.linearise_starts(parent.fit.model)
-    frozen = renewed(problem, parent.fit, *problem.columns(parent.fit.model, parent.fit.unknowns))
+    frozen = fit(problem, parent.fit.model, parent.fit.unknowns, iterations=0)
     there = named_by(parent.effects)
     possible = [
         one
@@ -106,10 +106,10 @@ def wanted(search: Search, problem: Problem, frozen: Fit) -> list[Candidate]:
     return search.new([*search.candidates, *residual_candidates(problem, search.fitted, frozen, search.effects)])
 
 
-def stepped(problem: Problem, frozen: Fit, candidate: Candidate) -> tuple[Candidate, Fit]:
+def stepped(problem: Problem, frozen: Fit, candidate: Candidate, iterations: int = STEPS) -> tuple[Candidate, Fit]:
     """Fit a law alone beside a frozen fit."""
     model, unknowns = candidate.added_to(frozen.model)
-    return candidate, fit(problem, model, unknowns, STEPS, frozen)
+    return candidate, fit(problem, model, unknowns, iterations, frozen)
 
 
 def best_starts(scores: Sequence[Score]) -> list[Candidate]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.criteria import STANDARD, Criteria
-from tactile_cube.identification.fitting.gauss_newton import Fit, fit, renewed
+from tactile_cube.identification.fitting.gauss_newton import Fit, fit
 from tactile_cube.identification.fitting.problem import Problem, Shooting
 from tactile_cube.identification.fitting.unknowns import Unknown, base_unknowns, every_effect
 from tactile_cube.identification.search.candidates import Candidate, candidates, model_unknowns
@@ -147,15 +147,7 @@ class Search:
     def frozen(self, fitted: Fit) -> Fit:
         """Return a fit with residual and columns updated on this problem."""
         self.problem.linearise_starts(fitted.model)
-        prediction, columns = self.problem.columns(fitted.model, fitted.unknowns)
-        return renewed(self.problem, fitted, prediction, columns)
-
-    def refit(
-        self, frozen: Fit, candidate: Candidate, iterations: int = 6, model: Model | None = None
-    ) -> tuple[Candidate, Fit]:
-        """Fit a candidate beside the frozen columns of its parent, started from `model` or the parent."""
-        model, unknowns = candidate.added_to(model or frozen.model)
-        return candidate, fit(self.problem, model, unknowns, iterations, frozen=frozen)
+        return fit(self.problem, fitted.model, fitted.unknowns, iterations=0)
 
     def refitted(self, model: Model) -> Fit:
         """Refit a model completely, linearising initial states anew as long as that helps."""
