@@ -3,17 +3,15 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tactile_cube.errors import InputError
+from tactile_cube.evaluation.episode_record import Array
 from tactile_cube.hand.gait import places
 from tactile_cube.hand.hand import Hand
 from tactile_cube.hand.object_mesh import tip_centres
 from tactile_cube.randomization import Grasps
 from tactile_cube.simulation import EpisodeConstants, Start, World
-
-Array = NDArray[np.float64]
 
 CLEARANCE = 1e-3  # gap between fingertip and face before the hand closes [m]; as in conf/start/wide_yaw.yaml
 REACHED = 1e-3

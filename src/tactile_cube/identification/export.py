@@ -11,11 +11,10 @@ from typing import Any, Literal
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tactile_cube.drivetrain.effects.catalogue import catalogue
-from tactile_cube.drivetrain.effects.effect import Stage
+from tactile_cube.drivetrain.effects.effect import Array, Stage
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile
 from tactile_cube.errors import InputError
 from tactile_cube.hand.rigid_body import RigidBodyTree
@@ -23,8 +22,6 @@ from tactile_cube.hand.urdf_tree import robot_of
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import nominal_model
 from tactile_cube.measurement.replay.simulator import Simulator
-
-Array = NDArray[np.float64]
 
 
 def _said(silent: float, unit: str) -> Any:

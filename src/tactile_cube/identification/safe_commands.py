@@ -6,17 +6,15 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_cube.identification.fitting.gauss_newton import Fit, precision
 from tactile_cube.identification.fitting.problem import Shooting
 from tactile_cube.identification.fitting.resolution import NORMAL_95
 from tactile_cube.identification.fitting.unknowns import Unknown, put_all, read_all
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.recordings.trial import Trial
+from tactile_cube.measurement.recordings.trial import Array, Trial
 from tactile_cube.measurement.replay.model import Model, no_offsets
 
-Array = NDArray[np.float64]
 QUANTITIES = ("position", "speed", "torque")
 TRIALS = "trials"  # source of a limit that nobody states: no further, faster or harder than the trials already went
 ROUNDING = 1e-9

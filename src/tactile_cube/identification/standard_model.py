@@ -14,10 +14,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects import find_effect
-from tactile_cube.drivetrain.effects.effect import Effect, Scales
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Scales
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.criteria import STANDARD
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit
@@ -33,7 +32,6 @@ from tactile_cube.measurement.replay.model import Model, Term, nominal_model
 from tactile_cube.measurement.replay.windows import Windows, between_steps
 from tactile_cube.measurement.units import milli
 
-Array = NDArray[np.float64]
 WINDOWS = (0.05, 0.2, 1.0, 4.0)  # [s] of a finger: short windows for poor start values, long ones for slow effects
 FEWEST_ROWS = 8
 LONGEST_FITTED = 24.0  # [s] of a finger by the number of joints: enough data for a first answer

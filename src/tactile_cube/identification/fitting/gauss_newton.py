@@ -4,14 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_cube.drivetrain.effects.effect import Array
 from tactile_cube.identification.fitting.problem import STEP, Problem
 from tactile_cube.identification.fitting.unknowns import Unknown, put_all, read_all
 from tactile_cube.measurement.comparing.error import CORRELATED
 from tactile_cube.measurement.replay.model import Model
 
-Array = NDArray[np.float64]
 DAMPING = 1e-4  # of a first step, in units of the information
 POOR = 1.0  # damping, in units of the information, from which on a fit that stops takes finer derivatives
 CONVERGED = 2e-3  # relative gain below which a fit ends that only has to be compared with others

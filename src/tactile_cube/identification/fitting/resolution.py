@@ -4,9 +4,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tactile_cube.drivetrain.effects.effect import Effect
+from tactile_cube.drivetrain.effects.effect import Array, Effect
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit, precision
 from tactile_cube.identification.fitting.problem import Problem, Shooting
@@ -17,7 +16,6 @@ from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model, nominal_model
 from tactile_cube.measurement.replay.windows import Windows, steps_per_row
 
-Array = NDArray[np.float64]
 FINER = 8  # factor by which steps are refined to see the error of the model's own: 0.25 ms beside 2 ms
 ENOUGH = 12  # windows in which it is measured, spread over the recording: up to 53 s of a finger
 

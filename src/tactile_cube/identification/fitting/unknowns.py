@@ -6,14 +6,12 @@ from dataclasses import dataclass, replace
 from typing import Literal, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tactile_cube.drivetrain.effects.effect import Effect, Scales
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Scales
 from tactile_cube.measurement.comparing.error import LARGEST_OFFSET
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model
 
-Array = NDArray[np.float64]
 Key = TypeVar("Key", str, int)
 
 

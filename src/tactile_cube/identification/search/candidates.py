@@ -7,9 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tactile_cube.drivetrain.effects.effect import FINGER, Effect, Parameter, Scales
+from tactile_cube.drivetrain.effects.effect import FINGER, Array, Effect, Parameter, Scales
 from tactile_cube.identification.fitting.gauss_newton import Fit, noise_inflation, precision
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.unknowns import Unknown
@@ -151,7 +150,6 @@ def without_effect(model: Model, effects: Sequence[Candidate], place: int) -> Mo
     return replace(model, terms=(*model.terms[:first], *model.terms[first + len(effects[place].joints) :]))
 
 
-Array = NDArray[np.float64]
 BATCH = 24  # candidates simulated at once, which bounds the memory
 
 

@@ -6,10 +6,9 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import t as student_t
 
-from tactile_cube.drivetrain.effects.effect import Effect
+from tactile_cube.drivetrain.effects.effect import Array, Effect
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.fitting.resolution import NORMAL_95, standard_errors
@@ -292,7 +291,6 @@ def reached(effect: type[Effect], fitted: Fit, half_width: Array, term: int) -> 
     }
 
 
-Array = NDArray[np.float64]
 LEAST = 0.012  # [rad] of a finger: smaller joint offsets are ordinary
 UNLIKELY = 0.001  # p-value over all joints below which offsets are not explained by initialisation
 STRIKING, DOUBTFUL = 0.03, 0.1  # [rad] of a finger and p-value: offsets between them are mentioned

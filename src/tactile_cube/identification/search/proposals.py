@@ -7,9 +7,8 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tactile_cube.drivetrain.effects.effect import Stage
+from tactile_cube.drivetrain.effects.effect import Array, Stage
 from tactile_cube.identification.criteria import Criteria
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit, noise_inflation, precision
 from tactile_cube.identification.fitting.problem import Problem
@@ -28,7 +27,6 @@ from tactile_cube.identification.search.residual_starts import residual_candidat
 from tactile_cube.identification.search.search import Search, failing
 from tactile_cube.measurement.replay.windows import Windows
 
-Array = NDArray[np.float64]
 LOOKED_AT = 4  # part of the segments to judge by, on which every law gets its own steps
 PROMISING = 0.01  # of its joint's squared error: least first-order gain of a law that is fitted
 STEPS = 2  # of Gauss-Newton for each promising law

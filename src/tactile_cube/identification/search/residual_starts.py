@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tactile_cube.drivetrain.effects.effect import Effect, Scales, Stage
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Scales, Stage
 from tactile_cube.drivetrain.signals import ANGLE, JOINT_TORQUE, ROWS
 from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.fitting.problem import Problem
@@ -16,7 +15,6 @@ from tactile_cube.identification.search.residual_shape import Missing, missing_t
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model
 
-Array = NDArray[np.float64]
 HARMONIC = "harmonic"  # parameter [1/rad] by which an effect says that it repeats with the position
 LOWEST, HIGHEST = 1.25, 160.0  # [1/rad] of a finger: waves of 5 rad to 39 mrad
 RESOLUTION = 0.8  # grid step times the range of motion: finer than half a peak

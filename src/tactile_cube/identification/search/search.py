@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.drivetrain.effects.effect import Effect
+from tactile_cube.drivetrain.effects.effect import Array, Effect
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit
@@ -23,7 +23,6 @@ from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model, nominal_model
 from tactile_cube.measurement.replay.windows import Windows
 
-Array = NDArray[np.float64]
 LONG = 8  # most iterations of a refit; one that converges ends before
 SEGMENTS = 132  # enough data to judge by, 52.8 s of a finger; the final fit takes all
 RENEWED, HELPS = 3, 0.98  # times that starts are taken anew, and part of the squared error that has to be left for that
