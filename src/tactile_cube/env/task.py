@@ -93,6 +93,7 @@ OUTCOMES = ("running", "time_limit", "dropped", "left_range", "tilted", "lifted"
 
 LONGEST = 1_000_000  # policy steps of an episode: more than a day
 RUNNING, TIME_LIMIT, DROPPED, LEFT_RANGE, TILTED, LIFTED, FAULTY = range(len(OUTCOMES))
+LOST = frozenset((DROPPED, LEFT_RANGE, TILTED, LIFTED))  # outcomes of a cube that left the allowed range
 
 
 @dataclass(frozen=True)
