@@ -73,25 +73,20 @@ def charged(costs: Array, samples: NDArray[np.int64], numbers: NDArray[np.int64]
     return np.asarray(costs + excess * ((independent / (independent - numbers)) ** 2 - 1.0))
 
 
-def joint_squares(problem: Problem, residual: Array) -> Array:
-    """Return squared residuals (n,) of each joint in units of the noise, initial states projected out."""
-    return np.asarray(np.maximum(_joint_squares(problem, residual)[0].sum(axis=0), 0.0))
-
-
 def joint_errors(problem: Problem, residual: Array) -> Array:
     """Return RMS residuals (n,) of each joint in units of the noise, initial states projected out."""
-    squares, present = _joint_squares(problem, residual)
+    squares, present = joint_squares(problem, residual)
     return np.asarray(np.sqrt(np.maximum(squares.sum(axis=0), 0.0) / np.maximum(present.sum(axis=0), 1)))
 
 
 def segment_errors(problem: Problem, residual: Array) -> Array:
     """Return the same for each segment (G, n); nan where nothing was measured."""
-    squares, present = _joint_squares(problem, residual)
+    squares, present = joint_squares(problem, residual)
     return np.asarray(np.sqrt(np.maximum(squares, 0.0) / np.where(present > 0, present, np.nan)))
 
 
-def _joint_squares(problem: Problem, residual: Array) -> tuple[Array, NDArray[np.int64]]:
-    """Return squared residuals (G, n), initial states projected out, and the number of samples."""
+def joint_squares(problem: Problem, residual: Array) -> tuple[Array, NDArray[np.int64]]:
+    """Return squared residuals (G, n) in units of the noise, initial states projected out, and the samples in each."""
     joint_of = problem.windows.joint_of
     shape = (len(residual), -1, len(joint_of))
     present = np.count_nonzero(problem.weight.reshape(shape), axis=1)
@@ -167,7 +162,8 @@ def in_blocks(difference: Array, judged: Judgement) -> Array:
     length = correlation_length(difference, trial)
     if length == 1:
         return difference
-    sums = [np.add.reduceat(part, np.arange(0, len(part), length)) for part in _by_trial(difference, trial)]
+    by_trial = np.split(difference, np.flatnonzero(np.diff(trial)) + 1)
+    sums = [np.add.reduceat(part, np.arange(0, len(part), length)) for part in by_trial]
     return np.concatenate(sums)
 
 
@@ -189,10 +185,6 @@ def correlation_length(difference: Array, trial: NDArray[np.int64]) -> int:
             break
         length += 2.0 * correlation
     return int(np.ceil(length))
-
-
-def _by_trial(values: Array, trial: NDArray[np.int64]) -> list[Array]:
-    return np.split(values, np.flatnonzero(np.diff(trial)) + 1)
 
 
 ITERATIONS = 3  # that the joint offsets of unseen initialisations take

@@ -18,7 +18,6 @@ from tactile_cube.identification.search.explanation import (
     Explanation,
     Proposal,
     nameable,
-    named,
     named_by,
     proven,
     simplest,
@@ -87,7 +86,7 @@ class Findings:
                 for one in self.judged
                 if not proven(one, criteria)
                 and one.judgement.costs.sum() < best.judgement.costs.sum()
-                and len(named(one)) <= len(named(best))
+                and len(named_by(one.effects)) <= len(named_by(best.effects))
             ]
         return sorted(found, key=lambda one: one.judgement.costs.sum())
 
@@ -230,13 +229,13 @@ def twins(search: Search, chosen: Explanation, first: Looks, judged: Sequence[Ex
     becomes them, as is the set without the effect. A law with many more parameters is not tried.
     """
     known = {named_by(one.effects) for one in judged}
-    itself, found = Proposal(chosen.effects, chosen.fit), list[Proposal]()
+    found: list[Proposal] = []
     for places in together(chosen.effects):
         replaced, looks = [chosen.effects[place] for place in places], first
         simpler = set.intersection(*(simpler_laws(search, chosen, place) for place in places))
         if len(places) < len(chosen.effects):
             joints = [joint for effect in replaced for joint in effect.joints]
-            looks = look(search, without(search, itself, *places), joints)
+            looks = look(search, without(search, chosen, *places), joints)
             if (left := named_by(looks.parent.effects)) not in known:
                 known.add(left)
                 found.append(looks.parent)
@@ -254,9 +253,9 @@ def twins(search: Search, chosen: Explanation, first: Looks, judged: Sequence[Ex
             if len(found) >= JUDGED or names in known or search.spent:
                 continue
             known.add(names)
-            if not near(looks, left_by(looks, one), [itself]):
+            if not near(looks, left_by(looks, one), [chosen]):
                 one = tuple(further(looks, law, fitted) for law, fitted in one)
-            if one[0][0].effect.name in simpler or near(looks, left_by(looks, one), [itself]):
+            if one[0][0].effect.name in simpler or near(looks, left_by(looks, one), [chosen]):
                 found.append(refitted(search, looks, one))
     return [one for one in found if one.fit.cost <= CLOSE * chosen.fit.cost]
 

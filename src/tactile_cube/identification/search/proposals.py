@@ -83,7 +83,8 @@ def look(search: Search, parent: Proposal, at: Sequence[str]) -> Looks:
         if there.isdisjoint(named_by([one])) and (one.joints[0] in at or one.effect.stage is Stage.MECHANISM)
     ]
     scores = screen(problem, frozen, possible)
-    squares = dict(zip(search.fitted.joints, joint_squares(problem, frozen.residual), strict=True))
+    of_joints = np.maximum(joint_squares(problem, frozen.residual)[0].sum(axis=0), 0.0)
+    squares = dict(zip(search.fitted.joints, of_joints, strict=True))
     promising = [one for one in scores if one.gain > PROMISING * min(squares[joint] for joint in one.candidate.joints)]
     tried = sorted((stepped(problem, frozen, one) for one in best_starts(promising)), key=lambda pair: pair[1].cost)
     alike = fit(problem, frozen.model, (), STEPS, frozen)
