@@ -1,7 +1,5 @@
 """Trials of a policy during training: without exploration, in worlds that stay the same throughout."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any

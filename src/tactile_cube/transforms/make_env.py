@@ -1,7 +1,5 @@
 """The training environment: worlds, transforms in their order, and a generator of its own for the noise."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace

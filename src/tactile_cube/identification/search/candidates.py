@@ -1,7 +1,5 @@
 """Candidates: every effect in every form, and models with effects added, removed or refined."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace

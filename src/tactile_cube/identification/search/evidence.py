@@ -1,7 +1,5 @@
 """Comparison of fitted models on held-out trials."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Forward selection of effects: single laws, growing sets, and one comparison on held-out trials."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Candidate sets of effects, ranked on the fitted trials: single laws, pairs, and one law at several joints."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations

@@ -1,7 +1,5 @@
 """Missing torque of a model: its average over bins of each signal, and the share that any law could explain."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Candidates whose starts are read from what a fit leaves: harmonics, profiles over the position."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

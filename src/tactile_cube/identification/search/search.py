@@ -1,7 +1,5 @@
 """Search problem: a recording split into fitted and held-out trials, and the candidate laws."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Sequence
