@@ -100,11 +100,6 @@ def model_unknowns(model: Model, sizes: Sizes | None = None) -> tuple[Unknown, .
     return tuple(u for place, term in enumerate(model.terms) for u in term_unknowns(term, place, sizes))
 
 
-def forms(effect: EffectClass) -> list[dict[str, float]]:
-    """Return the forms of an effect at a finger's joint."""
-    return effect.forms_at(FINGER)
-
-
 def candidates(sizes: Sizes, effects: Sequence[EffectClass]) -> list[Candidate]:
     """Return every effect in every form at each joint where it can act, except forms started from the residual."""
     return [

@@ -4,11 +4,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from tactile_cube.drivetrain.effects.effect import Array, Effect, Scales, Stage
+from tactile_cube.drivetrain.effects.effect import FINGER, Array, Effect, Scales, Stage
 from tactile_cube.drivetrain.signals import ANGLE, JOINT_TORQUE, ROWS
 from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.fitting.problem import Problem
-from tactile_cube.identification.search.candidates import Candidate, Sizes, forms
+from tactile_cube.identification.search.candidates import Candidate, Sizes
 from tactile_cube.identification.search.residual_shape import Missing, missing_torques
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model
@@ -29,7 +29,7 @@ def periodic_candidates(
     sizes: Sizes,
 ) -> list[Candidate]:
     """Return the candidates at the strongest harmonics of what is missing, for every effect that has one."""
-    periodic = [effect for effect in effects if any(HARMONIC in form for form in forms(effect))]
+    periodic = [effect for effect in effects if any(HARMONIC in form for form in effect.forms_at(FINGER))]
     found = []
     for missing in missing_torques:
         damping = float(model.constants["kd"][recording.joints.index(missing.joint)])
