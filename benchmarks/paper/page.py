@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.paper import budget
-from benchmarks.paper.rows import EVALUATE, HEAD, newest, paper_rows, typed
-from tactile_cube.evaluation.evaluation import read_results
+from benchmarks.paper.rows import EVALUATE, HEAD, newest, paper_rows, read_results, typed
 
 Results = dict[str, Any]
 TITLE, DIFFERENCES = "# The paper's results beside ours", "## Statement by statement"

@@ -11,6 +11,7 @@ from typing import Any
 
 from benchmarks.paper.model_card import read_card
 from tactile_cube.errors import InputError
+from tactile_cube.evaluation.evaluation import FORMAT
 from tactile_cube.evaluation.policy_path import SHIPPED
 from tactile_cube.evaluation.summary import wilson_interval
 
@@ -22,6 +23,7 @@ TRAIN = (
     "training.replay_size=300000"
 )
 """With the recipes of the commits that made `published`; today's `curriculum` is another."""
+KEYS = ("created", "protocol", "policy", "task", "seed", "command", "cpu_hours", "variants")  # of every results file
 HEAD = "| experiment | paper | here | command | commit |"
 SCRIPTED, REPLAY = "scripted", "replay"
 FINGER = "outputs/finger"
@@ -122,6 +124,24 @@ def _free_finger_row(comparison: Mapping[str, Any] | None) -> str:
 def newest(results: Sequence[Results], fits: Callable[[Results], bool]) -> Results | None:
     """Return the last of the results that fit."""
     return next((one for one in reversed(results) if fits(one)), None)
+
+
+def read_results(path: Path) -> Results:
+    """Read a results file.
+
+    Raises:
+        InputError: it is missing, damaged or something else.
+    """
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise InputError(f"{path}: not a results file of evaluate: {error}") from error
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
+        raise InputError(f"{path}: not a results file of evaluate (expected format {FORMAT!r})")
+    missing = [key for key in KEYS if key not in data]
+    if missing:
+        raise InputError(f"{path}: results without {', '.join(missing)}; run evaluate again")
+    return data
 
 
 def read_comparison(path: Path) -> dict[str, Any]:

@@ -8,8 +8,8 @@ import shutil
 from pathlib import Path
 
 from benchmarks.paper.model_card import model_card, read_ancestry
+from benchmarks.paper.rows import read_results
 from tactile_cube.agent.policy_file import load_actor
-from tactile_cube.evaluation.evaluation import read_results
 from tactile_cube.evaluation.policy_path import SHIPPED, policy_path
 
 

@@ -14,7 +14,7 @@ from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.fitting.unknowns import Unknown
 from tactile_cube.identification.search.candidates import Candidate
 from tactile_cube.identification.search.evidence import Judgement, gain, p_value
-from tactile_cube.identification.search.explanation import Explanation, named
+from tactile_cube.identification.search.explanation import Explanation, named_by
 from tactile_cube.identification.search.findings import Findings
 from tactile_cube.identification.verdict import decide
 from tactile_cube.measurement.replay.model import Model, Term
@@ -47,7 +47,7 @@ def decided(table: Mapping[str, Any], criteria: Criteria, strength: float = 1.0)
     found = _findings(table, strength)
     verdict = decide(found, criteria)
     sets = (verdict.chosen, *verdict.rivals) if verdict.kind not in ("adequate", "unknown_effect") else ()
-    named_in = [sorted(f"{name}@{joint}" for name, joint in named(one)) for one in sets]
+    named_in = [sorted(f"{name}@{joint}" for name, joint in named_by(one.effects)) for one in sets]
     return verdict.kind, named_in, found.base.largest_error
 
 

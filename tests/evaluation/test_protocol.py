@@ -7,7 +7,7 @@ import pytest
 from tactile_cube.drivetrain.effects import catalogue
 from tactile_cube.env import Task
 from tactile_cube.errors import InputError
-from tactile_cube.evaluation.protocol import NumbPolicy, Protocol, Pull, Variant, numb_reading, typical_effects
+from tactile_cube.evaluation.protocol import NumbPolicy, Protocol, Pull, Variant, numb_reading
 from tactile_cube.randomization import Randomization, Uniform
 from tactile_cube.transforms import EnvConfig
 
@@ -67,9 +67,10 @@ def test_a_pull_at_an_unknown_finger_is_refused() -> None:
 
 
 def test_every_effect_of_the_catalogue_has_a_typical_size() -> None:
-    assert {name: {type(effect).name for effect in typical_effects(name)} for name in catalogue()} == {
-        name: {name} for name in catalogue()
-    }
+    for name in catalogue():
+        effects = Variant(effects=(name,)).apply(config()).effects
+        assert {type(effect).name for effect in effects} == {name}
+        assert all(one.values == {p.name: p.typical for p in one.parameters} for one in effects)
 
 
 class Echo:

@@ -27,11 +27,15 @@ def test_the_parameters_to_fit_are_named_as_a_diagnosis_names_them(tmp_path: Pat
 @pytest.mark.parametrize(("less", "sign"), [(3.0, 1.0), (5.0, -1.0)])
 def test_of_starts_that_noise_cannot_tell_apart_the_usual_one_is_taken(less, sign, monkeypatch) -> None:
     monkeypatch.setattr(identification, "residual_candidates", lambda *_: [])
+    monkeypatch.setattr(
+        identification,
+        "stepped",
+        lambda _, __, one, ___: (one, SimpleNamespace(cost=1000.0 - less * (one.form["mass"] < 0.0), form=one.form)),
+    )
     search = SimpleNamespace(
         shooting=SimpleNamespace(sizes={"a": FINGER}),
         problem=SimpleNamespace(weight=np.ones(1000)),
         fitted=None,
-        refit=lambda _, one: (one, SimpleNamespace(cost=1000.0 - less * (one.form["mass"] < 0.0), form=one.form)),
     )
     taken: Any = with_effect(search, None, find_effect("payload"), "a")  # type: ignore[arg-type]
     assert np.sign(taken.form["mass"]) == sign

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.identification.fitting.problem import Shooting
 from tactile_cube.identification.search.evidence import HeldOut
-from tactile_cube.identification.search.explanation import named, named_by
+from tactile_cube.identification.search.explanation import named_by
 from tactile_cube.identification.search.findings import find
 from tactile_cube.identification.search.search import Search
 from tactile_cube.identification.standard_model import StandardModel, fit_standard_model, soft_l1
@@ -100,7 +100,7 @@ def test_a_search_judges_it_as_one_of_its_sets(tmp_path: Path) -> None:
     assert decide(find(search)).kind == "unknown_effect"
     verdict = decide(find(search, one.proposal))
     assert verdict.kind == "missing_effect"
-    assert named(verdict.chosen) == named_by(one.effects)
+    assert named_by(verdict.chosen.effects) == named_by(one.effects)
     assert verdict.chosen.error < 1.1
 
 

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from tactile_cube.drivetrain.effects import find_effect
+from tactile_cube.drivetrain.effects.effect import FINGER
 from tactile_cube.identification.criteria import Criteria
 from tactile_cube.identification.fitting.gauss_newton import Fit
-from tactile_cube.identification.search.candidates import Candidate, forms, term_unknowns
+from tactile_cube.identification.search.candidates import Candidate, term_unknowns
 from tactile_cube.identification.search.evidence import Judgement, gain, worse
 from tactile_cube.identification.search.explanation import Explanation, at_bound, proven, sound, unproven
 from tactile_cube.identification.search.findings import Findings
@@ -29,7 +30,7 @@ def judged(error: float, seed: int = 0) -> Judgement:
 
 def explanation(name: str, error: float, base: float = 20.0, seed: int = 0) -> Explanation:
     effect = find_effect(name)
-    candidate = Candidate(effect, ("q1",), forms(effect)[0])
+    candidate = Candidate(effect, ("q1",), effect.forms_at(FINGER)[0])
     before, after = judged(base), judged(error, seed)
     return Explanation((candidate,), FIT, after, 1e-9, gain(before, after))
 

@@ -4,7 +4,7 @@ import xml.etree.ElementTree as ElementTree
 import numpy as np
 import pytest
 
-from tactile_cube.visualization.charts import WIDTH, Interval, bar_chart, heat_map, interval_chart, svg, time_chart
+from tactile_cube.visualization.charts import WIDTH, bar_chart, heat_map, interval_chart, svg, time_chart
 
 INK = "#123456"
 
@@ -51,7 +51,7 @@ def test_missing_samples_interrupt_the_line_of_a_long_recording_too(samples: int
 def test_tables_hold_their_names_and_numbers() -> None:
     bars = bar_chart([("nominal", 7.0), ("refitted", 0.6)], "mrad", 0.5)
     cells = heat_map(["q1"], ["slow", "fast"], [[123.4, None]])
-    intervals = interval_chart([Interval("excess", 0.08, 0.07, 0.09, "N m"), Interval("fixed", 1, 1, 1, "s")])
+    intervals = interval_chart([("excess", 0.08, 0.07, 0.09, "N m"), ("fixed", 1, 1, 1, "s")])
     words = {bars: ["nominal", "refitted", "7 mrad", "noise floor 0.5 mrad"], cells: ["slow", "fast", "q1", "123"]}
     words[intervals] = ["excess", "0.08 N m [0.07, 0.09]", "fixed", "1 s [1, 1]"]
     for chart, expected in words.items():

@@ -193,7 +193,7 @@ DIAGNOSIS: dict[str, Any] = {
     ],
     "unexplained": [],
     "unexplained_joints": [],
-    "ranking": [{"effect": "command_delay@a", "gain": 0.8}, {"effect": "backlash@a", "gain": 0.1}],
+    "ranking": [{"effects": "command_delay@a", "gain": 0.8}, {"effects": "backlash@a", "gain": 0.1}],
     "error": {"nominal": 0.007, "refitted": 0.005, "with_effects": 0.0006, "noise_floor": 0.0005},
     "next_experiment": None,
     "seconds": 12.0,

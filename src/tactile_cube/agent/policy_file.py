@@ -26,6 +26,7 @@ from safetensors.numpy import load, save
 
 from tactile_cube.drivetrain.plain_yaml import describe
 from tactile_cube.errors import InputError
+from tactile_cube.untrusted_file import regular
 from tactile_cube.whole_file import write_whole
 
 if TYPE_CHECKING:
@@ -33,16 +34,13 @@ if TYPE_CHECKING:
 
 FORMAT = "tactile_cube policy 2"
 NO_DIGEST = b"0" * 64
-KEPT = re.compile(r"policy_(\d+)\.safetensors")
-"""Policies that a run keeps each `training.policy_every` steps."""
+KEPT = re.compile(r"policy_(\d+)\.safetensors")  # policies that a run keeps each `training.policy_every` steps
 LARGEST, LARGEST_HEADER = 1 << 28, 1 << 22
 """Bytes of a file and of its header; the shipped policies have 1.4 million and some thousand."""
 WIDEST, DEEPEST = 1 << 16, 32
-Width = Annotated[int, Field(gt=0, le=WIDEST)]
-"""Number of units of a layer."""
+Width = Annotated[int, Field(gt=0, le=WIDEST)]  # number of units of a layer
 Array = NDArray[np.float32]
-Layer = tuple[Array, Array]
-"""Weight (out, in) and bias (out,)."""
+Layer = tuple[Array, Array]  # weight (out, in) and bias (out,)
 
 
 class PolicyInfo(BaseModel):
@@ -118,7 +116,10 @@ def read_policy(path: Path) -> tuple[PolicyInfo, list[Layer]]:
         InputError: the file is missing, too large, damaged, no policy, of other sizes than it states, or holds numbers
             that are not finite.
     """
-    content = _content(path)
+    try:
+        content = regular(path, LARGEST, "; train a policy or give policy=<file>.safetensors").read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
     info = _read_info(path, _verified(path, content))
     try:
         tensors = load(content)
@@ -160,17 +161,6 @@ def current_commit() -> str:
     except (OSError, subprocess.SubprocessError):
         return "unknown"
     return run.stdout.strip() or "unknown"
-
-
-def _content(path: Path) -> bytes:
-    if not path.is_file():
-        raise InputError(f"{path}: no such policy file; train one or give policy=<file>.safetensors")
-    try:
-        if path.stat().st_size > LARGEST:
-            raise InputError(f"{path}: {path.stat().st_size} bytes; a policy file has at most {LARGEST}")
-        return path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
 
 
 def _verified(path: Path, content: bytes) -> dict[str, Any]:

@@ -6,8 +6,6 @@ nothing outside itself (`${...}`), and names only shipped files: who has the han
 grasps in files of their own names them on the command line.
 """
 
-from __future__ import annotations
-
 import inspect
 import math
 from collections.abc import Collection, Iterator, Mapping

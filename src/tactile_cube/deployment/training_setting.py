@@ -20,8 +20,7 @@ from tactile_cube.simulation import EpisodeConstants, constants_of
 
 DRIVES = {"kp": (0.5, 2.0), "kd": (0.5, 2.0), "torque_limit": (0.0, 1.0)}
 """Allowed range of a training's gains and torque limit, as multiples of the hand's own."""
-MISS = 0.01
-"""Largest distance of a fingertip from its place at the object [m]; beyond, the object is out of reach."""
+MISS = 0.01  # largest distance of a fingertip from its place at the object [m]; beyond, the object is out of reach
 CONSTANTS = {"object", *(field.name for field in fields(EpisodeConstants))}
 
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from tactile_cube import compiled as decorator
 from tactile_cube.drivetrain import laws, signals
-from tactile_cube.drivetrain.effects.effect import Array, Effect, Stage
+from tactile_cube.drivetrain.effects.effect import Effect, Stage
 from tactile_cube.drivetrain.signals import ROWS
 from tactile_cube.errors import InputError
 from tactile_cube.hand import rigid_body_equations
@@ -56,17 +56,6 @@ class MemoryLayout:
 
     entries: dict[str, tuple[int, Shape]]
     size: int
-
-    def view(self, memory: Array, key: str) -> Array:
-        """Return a writable view (..., shape) of a key in memory (..., size).
-
-        Raises:
-            KeyError: no such key.
-        """
-        offset, shape = self.entries[key]
-        part = memory[..., offset : offset + prod(shape)]
-        part.shape = memory.shape[:-1] + shape  # never a copy
-        return part
 
 
 def plan_memory(topology: Topology, effects: Sequence[type[Effect]], dt: float, trace_rows: int) -> MemoryLayout:

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from itertools import product
+from math import prod
 from typing import Any, Literal
 
 import numpy as np
@@ -174,19 +175,21 @@ class Plant:
         self.trace_rows = trace_rows
         self.layout: MemoryLayout = plan_memory(self.topology, self.effects, self.dt, trace_rows)
 
-    @property
-    def size(self) -> int:
-        """Numbers in a memory."""
-        return self.layout.size
-
     @cached_property
     def kernel(self) -> Any:
         """The compiled steps, generated when first used; see `steps.entry_points`."""
         return load_kernel(self.topology, self.effects, self.layout)
 
     def view(self, memory: Array, key: str) -> Array:
-        """Return a writable view (..., shape) of memory (..., size)."""
-        return self.layout.view(memory, key)
+        """Return a writable view (..., shape) of a key in memory (..., size).
+
+        Raises:
+            KeyError: no such key.
+        """
+        offset, shape = self.layout.entries[key]
+        part = memory[..., offset : offset + prod(shape)]
+        part.shape = memory.shape[:-1] + shape  # never a copy
+        return part
 
     def signal(self, memory: Array, row: int) -> Array:
         """Return one signal (..., all joints) of the last step, e.g. `signals.MOTOR_POSITION`."""
@@ -214,7 +217,7 @@ class Plant:
     @cached_property
     def _blank(self) -> Array:
         """What every memory (size,) holds: the mechanism, the step and where things lie."""
-        memory = np.zeros(self.size)
+        memory = np.zeros(self.layout.size)
         header = {"dt": self.dt, "trace_rows": self.trace_rows, "reading": LAST_SUBSTEP}
         for key, value in {**header, "trace_offset": self.layout.entries["trace"][0], "unsure": UNSURE}.items():
             self.view(memory, key)[...] = value
@@ -264,17 +267,16 @@ class Plant:
         followers = tuple(k for k, leader in enumerate(follow) if leader == j and k != link)
         return Place(joint=a, chain=chain, link=link, followers=followers)
 
-    def reset(self, memory: Array, q: npt.ArrayLike, v: npt.ArrayLike = 0.0, time: float = 0.0) -> None:
+    def reset(self, memory: Array, q: npt.ArrayLike, v: npt.ArrayLike = 0.0) -> None:
         """Start memory (..., size) anew at positions q [rad] and speeds v [rad/s] (..., all joints) of the links.
 
-        Filters are at q, effects without a past; `time` is that of the first step [s].
+        Filters are at q, effects without a past.
         """
         for key in ("q", "filtered", "limited", "goal"):
             self.view(memory, key)[...] = q
         self.view(memory, "v")[...] = v
-        for key in ("extra", "extra_compliance", "held_back", "contact", "signals", "seen"):
+        for key in ("extra", "extra_compliance", "held_back", "contact", "signals", "seen", "step"):
             self.view(memory, key)[...] = 0.0
-        self.view(memory, "step")[...] = time / self.dt
         if self.effects:  # their states follow each other
             first, _ = self.layout.entries[f"state:{self.effects[0].name}"]
             memory[..., first : self.layout.entries["trace"][0]] = 0.0

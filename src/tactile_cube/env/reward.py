@@ -15,10 +15,8 @@ from numpy.typing import NDArray
 from tactile_cube.env.task import CubePose
 from tactile_cube.errors import InputError
 
-TOUCH_FORCE = 0.02
-"""Smallest normal force that counts as touching [N]: a twenty-fifth of the cube's weight."""
-SUPPORTING_TIPS = 3
-"""Fingertips that must touch the cube for it to count as supported by tips."""
+TOUCH_FORCE = 0.02  # smallest normal force that counts as touching [N]: a twenty-fifth of the cube's weight
+SUPPORTING_TIPS = 3  # fingertips that must touch the cube for it to count as supported by tips
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,8 +56,7 @@ class Term(NamedTuple):
     scaled: bool
 
 
-TERMS: dict[str, Term] = {}
-"""By name, which is that of the function and of the weight."""
+TERMS: dict[str, Term] = {}  # by name, which is that of the function and of the weight
 
 
 def term(sign: int, scaled: bool = False) -> Callable[[Callable[[Step], float]], Callable[[Step], float]]:

@@ -4,33 +4,15 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_cube.env.reward import Reward, Step
-from tactile_cube.env.task import (
-    DROPPED,
-    FAULTY,
-    LEFT_RANGE,
-    LIFTED,
-    RUNNING,
-    TILTED,
-    TIME_LIMIT,
-    CubePose,
-    Task,
-    cube_pose,
-    frame_along,
-    seen_along,
-)
+from tactile_cube.env.task import FAULTY, LOST, RUNNING, TIME_LIMIT, CubePose, Task, cube_pose, frame_along, seen_along
 from tactile_cube.hand import DLR_HAND2, Hand, tip_positions
 from tactile_cube.randomization import GraspTable, Randomization, StartPoses, drawn_places
 from tactile_cube.simulation import EpisodeConstants, World
+from tactile_cube.simulation.constants import Array
 
-Array = NDArray[np.float64]
-
-OBJECT = 13
-"""Numbers of the object in what only critics see; q_f follows."""
-LOST = frozenset((DROPPED, LEFT_RANGE, TILTED, LIFTED))
-"""Outcomes that end an episode because the cube left the allowed range."""
+OBJECT = 13  # numbers of the object in what only critics see; q_f follows
 
 
 @dataclass(slots=True)

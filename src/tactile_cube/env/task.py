@@ -91,9 +91,9 @@ class Conditions:
 OUTCOMES = ("running", "time_limit", "dropped", "left_range", "tilted", "lifted", "faulty")
 """What an episode's step can lead to; the key "outcome" is an index into it."""
 
-LONGEST = 1_000_000
-"""Policy steps of an episode: more than a day."""
+LONGEST = 1_000_000  # policy steps of an episode: more than a day
 RUNNING, TIME_LIMIT, DROPPED, LEFT_RANGE, TILTED, LIFTED, FAULTY = range(len(OUTCOMES))
+LOST = frozenset((DROPPED, LEFT_RANGE, TILTED, LIFTED))  # outcomes of a cube that left the allowed range
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from tensordict import TensorDict, TensorDictBase
 from torchrl.data import Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
-from tactile_cube.env.rotation import OBJECT, Array, RotationEnv, TimeStep
-from tactile_cube.env.task import FAULTY, OUTCOMES, Conditions
+from tactile_cube.env.rotation import OBJECT, RotationEnv, TimeStep
+from tactile_cube.env.task import FAULTY, OUTCOMES
 
 
 class WorldsEnv(EnvBase):  # type: ignore[misc]
@@ -19,6 +19,10 @@ class WorldsEnv(EnvBase):  # type: ignore[misc]
     Keys are those of TimeStep, besides "episode_step", "faulty", "action" (joints), "done", "terminated", "truncated",
     and where constants are steered "places", see RotationEnv. Transitions whose "faulty" is true come from broken
     physics and must not be learned from.
+
+    Attributes:
+        conditions: of the episodes that start from now on.
+        odds: probabilities of the parts of the steered constants' ranges, in the episodes that start from now on.
 
     Example:
         >>> env = WorldsEnv([RotationEnv(...), RotationEnv(...)])
@@ -30,6 +34,7 @@ class WorldsEnv(EnvBase):  # type: ignore[misc]
         """Host `tasks`."""
         super().__init__(device="cpu", batch_size=[len(tasks)])
         self.tasks = list(tasks)
+        self.conditions, self.odds = self.tasks[0].conditions, self.tasks[0].odds
         self.final_conditions = self.tasks[0].task.conditions()
         self._time_steps: list[TimeStep] = []
         self._make_specs()
@@ -52,26 +57,6 @@ class WorldsEnv(EnvBase):  # type: ignore[misc]
         flag = Categorical(2, shape=(n, 1), dtype=torch.bool)
         self.done_spec = Composite(done=flag, terminated=flag.clone(), truncated=flag.clone(), shape=(n,))
 
-    @property
-    def conditions(self) -> Conditions:
-        """Conditions of the episodes that start from now on."""
-        return self.tasks[0].conditions
-
-    @conditions.setter
-    def conditions(self, conditions: Conditions) -> None:
-        for task in self.tasks:
-            task.conditions = conditions
-
-    @property
-    def odds(self) -> Array:
-        """Probabilities of the parts of the steered constants' ranges, in the episodes that start from now on."""
-        return self.tasks[0].odds
-
-    @odds.setter
-    def odds(self, odds: Array) -> None:
-        for task in self.tasks:
-            task.odds = odds
-
     def _set_seed(self, seed: int | None) -> None:
         """Seed every world, and the generator that the transforms draw from."""
         if seed is not None:
@@ -84,6 +69,8 @@ class WorldsEnv(EnvBase):  # type: ignore[misc]
 
     def _reset(self, tensordict: TensorDictBase | None = None, **_: Any) -> TensorDictBase:
         mask = None if tensordict is None else tensordict.get("_reset", None)
+        for task in self.tasks:
+            task.conditions, task.odds = self.conditions, self.odds
         chosen = [True] * len(self.tasks) if mask is None or not self._time_steps else mask.flatten().tolist()
         self._time_steps = [
             task.reset() if start else self._time_steps[i]

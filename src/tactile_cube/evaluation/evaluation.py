@@ -7,7 +7,6 @@ from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -15,7 +14,6 @@ from torchrl.envs import TransformedEnv
 
 from tactile_cube.agent.policy_file import current_commit
 from tactile_cube.env import RotationEnv, Task
-from tactile_cube.errors import InputError
 from tactile_cube.evaluation.episode_record import EpisodeRecord
 from tactile_cube.evaluation.policies import Policy, PolicySource, ReplayPolicy
 from tactile_cube.evaluation.protocol import NumbPolicy, Protocol, Variant
@@ -63,8 +61,7 @@ class VariantResult:
         return "\n".join(lines)
 
 
-SPINNING_FRICTION = "spinning friction [mm]"
-"""The axis whose nominal value is the environment's."""
+SPINNING_FRICTION = "spinning friction [mm]"  # the axis whose nominal value is the environment's
 
 
 class Evaluation:
@@ -182,8 +179,6 @@ class DisplacedStart:
 
 
 FORMAT = "tactile_cube results 1"
-KEYS = ("created", "protocol", "policy", "task", "seed", "command", "cpu_hours", "variants")
-"""Keys that every results file must have."""
 
 
 @dataclass(frozen=True)
@@ -220,21 +215,3 @@ def write_results(path: Path, run: EvaluationRun, variants: list[VariantResult])
     }
     text = json.dumps(data, indent=1, default=lambda one: one.tolist() if hasattr(one, "tolist") else str(one))
     write_whole(path, text.encode())
-
-
-def read_results(path: Path) -> dict[str, Any]:
-    """Read a results file.
-
-    Raises:
-        InputError: it is missing, damaged or something else.
-    """
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise InputError(f"{path}: not a results file of evaluate: {error}") from error
-    if not isinstance(data, dict) or data.get("format") != FORMAT:
-        raise InputError(f"{path}: not a results file of evaluate (expected format {FORMAT!r})")
-    missing = [key for key in KEYS if key not in data]
-    if missing:
-        raise InputError(f"{path}: results without {', '.join(missing)}; run evaluate again")
-    return data

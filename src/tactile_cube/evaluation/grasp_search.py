@@ -3,46 +3,36 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tactile_cube.errors import InputError
+from tactile_cube.evaluation.episode_record import Array
 from tactile_cube.hand.gait import places
 from tactile_cube.hand.hand import Hand
 from tactile_cube.hand.object_mesh import tip_centres
 from tactile_cube.randomization import Grasps
 from tactile_cube.simulation import EpisodeConstants, Start, World
 
-Array = NDArray[np.float64]
-
-CLEARANCE = 1e-3
-"""Gap between fingertip and face before the hand closes [m]; as in conf/start/wide_yaw.yaml."""
+CLEARANCE = 1e-3  # gap between fingertip and face before the hand closes [m]; as in conf/start/wide_yaw.yaml
 REACHED = 1e-3
 """A place counts as reachable if the fingertip comes this near to it [m]: a tenth of how deep targets press."""
-BETWEEN_TIPS = 2e-3
-"""Least gap between the tips of two fingers before the hand closes [m]."""
+BETWEEN_TIPS = 2e-3  # least gap between the tips of two fingers before the hand closes [m]
 CLOSING_TIME = 0.1
 """T_s while the hand closes [s]: targets are constant, so what stands in the end hardly depends on it."""
 
 
-YAW = 0.25 * np.pi
-"""The object is turned by at most this about the vertical [rad]; a cube's faces repeat beyond."""
-SWING = 0.9
-"""A finger stands at most this far about the vertical from its own place [rad]."""
+YAW = 0.25 * np.pi  # the object is turned by at most this about the vertical [rad]; a cube's faces repeat beyond
+SWING = 0.9  # a finger stands at most this far about the vertical from its own place [rad]
 PRESS, AWAY = (0.004, 0.016), (0.008, 0.03)
 """Depth of a holding finger's target under the face, gap between the face and that of a finger in the air [m]."""
-IN_AIR = 0.5
-"""Part of the tries in which one finger is in the air; needs four fingers."""
+IN_AIR = 0.5  # part of the tries in which one finger is in the air; needs four fingers
 CLOSING, HOLDING, WATCHED = 4, 10, 5
 """Policy steps without weight in which the hand closes; at full weight; the last of them, in which nothing may move."""
-CREEP, TURN = 0.001, 0.02
-"""How far [m] and by which angle [rad] the object may move in them."""
+CREEP, TURN = 0.001, 0.02  # how far [m] and by which angle [rad] the object may move in them
 SHIFTED, TILTED = 0.012, 0.25
 """Largest distance of the object from the middle of the hand [m] and angle between its axis and the vertical [rad]."""
-TOUCHING = 3
-"""Least number of fingertips that hold it."""
-TRIES = 100
-"""Tries for each grasp wanted, after which the search gives up."""
+TOUCHING = 3  # least number of fingertips that hold it
+TRIES = 100  # tries for each grasp wanted, after which the search gives up
 
 
 def find_grasps(world: World, constants: EpisodeConstants, count: int, seed: int) -> Grasps:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.drivetrain.effects import Effect, catalogue, resolve
+from tactile_cube.drivetrain.effects import catalogue
 from tactile_cube.env import RotationEnv
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.episode_record import Array
@@ -17,8 +17,7 @@ from tactile_cube.hand import DLR_HAND2, Hand
 from tactile_cube.simulation import EpisodeConstants, SimulationOptions
 from tactile_cube.transforms import EnvConfig
 
-UNCHANGED = "worlds as drawn"
-"""Name of the condition in which worlds and starts stay as drawn."""
+UNCHANGED = "worlds as drawn"  # name of the condition in which worlds and starts stay as drawn
 CHANGEABLE = {"constants": EpisodeConstants, "simulation": SimulationOptions}
 
 
@@ -139,16 +138,8 @@ class Variant:
             constants=dataclasses.replace(config.constants, **constants),
             randomization=dataclasses.replace(config.randomization, values=values),
             simulation=dataclasses.replace(config.simulation, **self.simulation),
-            effects=[*config.effects, *(one for name in self.effects for one in typical_effects(name, config.hand))],
+            effects=[*config.effects, *self.effects],
         )
-
-
-def typical_effects(name: str, hand: Hand = DLR_HAND2) -> list[Effect]:
-    """Return an effect at its typical size, one for each joint `name` matches (all of them without an `@`)."""
-    return [
-        effect(joint, **{parameter.name: parameter.typical for parameter in effect.parameters})
-        for effect, joint in resolve([name], hand.joint_names)
-    ]
 
 
 @dataclass(frozen=True)

@@ -11,15 +11,13 @@ from statistics import median
 from tactile_cube.errors import InputError
 
 ANGLE, STEPS = "final_angle", "steps"
-CURRICULUM = ("T_s", "gravity")
-"""Columns that a curriculum changes: [s] and share of the weight."""
+CURRICULUM = ("T_s", "gravity")  # columns that a curriculum changes: [s] and share of the weight
 MEDIANS = ("million steps: median (interval)", "angle at the end [rad]: median (interval)", "CPU hours of all runs")
 COSTS = ("simulating_hours", "learning_hours")
 REGRASPING = 3.0
 """Mean final angle [rad] that shows regrasping in training: with starts turned by up to 43 deg a single twist comes to
 2 rad and more, and in part of the episodes a gait may act that reaches 2.5 to 3 rad."""
-WINDOW_FILL = 50
-"""Number of episodes that the mean is taken over; ignore the mean before that many have ended."""
+WINDOW_FILL = 50  # number of episodes that the mean is taken over; ignore the mean before that many have ended
 
 
 @dataclass(frozen=True)

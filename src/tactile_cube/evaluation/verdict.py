@@ -15,10 +15,8 @@ REGRASP_ANGLE = 2.0
 
 Source: all four tips in contact reach about -49..+52 deg of yaw (1.76 rad from end to end), measured on this hand.
 """
-STILL_ANGLE = 0.5
-"""Below this final angle the cube counts as held, not turned [rad]."""
-REGRASP_FACE_CHANGES = 2
-"""Moves of a finger to another side face that a regrasping episode shows at least."""
+STILL_ANGLE = 0.5  # below this final angle the cube counts as held, not turned [rad]
+REGRASP_FACE_CHANGES = 2  # moves of a finger to another side face that a regrasping episode shows at least
 LATE_SHARE, LATE_ANGLE = 0.4, 0.25
 """The last part of an episode, and the angle that must be gained in it [rad]: less means that the hand stagnates."""
 SUCCESS_RATE = 15.0 / 40.0
@@ -26,19 +24,15 @@ SUCCESS_RATE = 15.0 / 40.0
 
 15 rad in 40 s is the paper's best run (section IV). It depends on no other episode, whatever their length.
 """
-SUCCESS = "kept to the end and turned by at least 15 rad in 40 s, in proportion for other lengths"
-"""The rule in words."""
+SUCCESS = "kept to the end and turned by at least 15 rad in 40 s, in proportion for other lengths"  # the rule in words
 MAX_ANGLE_MISMATCH = 0.3
 """Largest difference between the reported angle and the integrated rotation about the task's axis [rad]."""
 CONE = 0.06
 """Share of the angle that may differ besides: the axis of a cube tilted by up to 20 deg goes around a cone as it turns,
 whose solid angle 1 - cos(20 deg) a turn is in the integrated rotation and not in the angle."""
-MAX_FREE_SPIN_SHARE = 0.2
-"""Largest share of the final angle that may be gained while nothing holds the cube."""
-MAX_TILT = 0.8
-"""Largest tilt of the cube's z axis [rad]; the training episode ends there too."""
-MAX_PENETRATION = 0.006
-"""Deepest overlap of a finger and the cube [m]; a firm grasp of 10 N overlaps by less than 1 mm."""
+MAX_FREE_SPIN_SHARE = 0.2  # largest share of the final angle that may be gained while nothing holds the cube
+MAX_TILT = 0.8  # largest tilt of the cube's z axis [rad]; the training episode ends there too
+MAX_PENETRATION = 0.006  # deepest overlap of a finger and the cube [m]; a firm grasp of 10 N overlaps by less than 1 mm
 MAX_STEP_ANGLE = np.pi / 4
 """Largest turn within one policy step [rad]: beyond it a quarter turn of the symmetric cube could hide."""
 FACES = ("+x", "-x", "+y", "-y", "+z", "-z")

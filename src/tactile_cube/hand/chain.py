@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from tactile_cube.hand.urdf import Array
 
 _ROUNDS = 40  # steps of the search; from the middle of the range, points within reach take five to fifteen
 _CLOSE = 1e-7  # A tip this near to its target is there [m]

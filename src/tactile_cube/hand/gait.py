@@ -11,12 +11,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
 from tactile_cube.hand.hand import Hand
-
-Array = NDArray[np.float64]
+from tactile_cube.hand.urdf import Array
 
 PLACES = np.radians([-90.0, 0.0, 90.0, 180.0])
 """Where ring, middle, fore and thumb of the DLR-Hand II stand around the cube."""

@@ -7,12 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from tactile_cube import limits
 from tactile_cube.errors import InputError
+from tactile_cube.hand.urdf import Array
 
-Array = npt.NDArray[np.float64]
 MOVABLE = ("revolute", "continuous", "prismatic")
 FREE = ("floating", "planar")  # types of joints without a drive; their links are held where the URDF puts them
 ROUNDING = 0.02  # share of the largest principal moment that rounded numbers may lack to those of a body

@@ -45,5 +45,4 @@ class Criteria:
             raise InputError(f"criteria.margin={self.margin}: not a share of a limit; give 0 to below 1, such as 0.1")
 
 
-STANDARD = Criteria()
-"""The defaults, the same as in conf/criteria/standard.yaml."""
+STANDARD = Criteria()  # the defaults, the same as in conf/criteria/standard.yaml

@@ -19,9 +19,9 @@ from tactile_cube.identification.fitting.resolution import Fitted, needless, res
 from tactile_cube.identification.next_experiment import Experiment, next_experiment
 from tactile_cube.identification.search.candidates import first_term
 from tactile_cube.identification.search.evidence import HeldOut, gain, judge, worse
-from tactile_cube.identification.search.explanation import Explanation, Proposal, named, named_by
+from tactile_cube.identification.search.explanation import Explanation, Proposal, named_by
 from tactile_cube.identification.search.findings import CommonOffset, Findings, common_offsets, find, reached
-from tactile_cube.identification.search.proposals import without
+from tactile_cube.identification.search.proposals import MORE_STEPS, stepped, without
 from tactile_cube.identification.search.search import BestSoFar, Search
 from tactile_cube.identification.standard_model import StandardModel, fit_standard_model
 from tactile_cube.identification.verdict import Simulations, Unexplained, Verdict, decide
@@ -35,14 +35,10 @@ from tactile_cube.measurement.replay.windows import steps_per_row
 from tactile_cube.measurement.split import held_out_split, with_test_part
 from tactile_cube.measurement.units import common_unit
 
-MOST_INTERVALS = 12
-"""Maximum number of disturbed intervals; each search for more of them repeats the whole diagnosis."""
-NOT_ALL = ("unknown_effect", "partly_explained")
-"""Verdicts that say that more is missing than is named."""
-LESS = (*NOT_ALL, "ambiguous")
-"""Verdicts that do not name everything that is missing, the least informative first."""
-ALL = (len(LESS), True)
-"""Rank of an answer that names everything and leaves little error, see `Answer.says`."""
+MOST_INTERVALS = 12  # maximum number of disturbed intervals; each search for more of them repeats the whole diagnosis
+NOT_ALL = ("unknown_effect", "partly_explained")  # verdicts that say that more is missing than is named
+LESS = (*NOT_ALL, "ambiguous")  # verdicts that do not name everything that is missing, the least informative first
+ALL = (len(LESS), True)  # rank of an answer that names everything and leaves little error, see `Answer.says`
 
 
 class Answer(NamedTuple):
@@ -296,7 +292,7 @@ def without_needless(answer: Answer) -> Verdict:
     idle = [k for k, one in enumerate(chosen.effects) if out.issuperset(range(first[k], first[k] + len(one.joints)))]
     if not idle or len(idle) == len(chosen.effects):
         return verdict
-    less = search.explained(without(search, Proposal(chosen.effects, chosen.fit), *idle), findings.looked)
+    less = search.explained(without(search, chosen, *idle), findings.looked)
     if worse(less.judgement, chosen.judgement, search.criteria):
         return verdict
     return instead_of(verdict, less)
@@ -320,9 +316,10 @@ def in_simpler_laws(answer: Answer, verdict: Verdict) -> Verdict:
         ]
         if not simpler:
             continue
-        left = without(search, Proposal(chosen.effects, chosen.fit), place)
+        left = without(search, chosen, place)
         parent = search.frozen(left.fit)
-        best, begun = min((search.refit(parent, one) for one in simpler), key=lambda one: one[1].cost)
+        refitted = (stepped(search.problem, parent, one, MORE_STEPS) for one in simpler)
+        best, begun = min(refitted, key=lambda one: one[1].cost)
         tried = Proposal((*left.effects, best), search.refitted(begun.model))
         if not worse((less := search.explained(tried, findings.looked)).judgement, chosen.judgement, search.criteria):
             verdict = instead_of(verdict, less)
@@ -331,7 +328,7 @@ def in_simpler_laws(answer: Answer, verdict: Verdict) -> Verdict:
 
 def instead_of(verdict: Verdict, less: Explanation) -> Verdict:
     """Return the verdict with a simpler explanation, which is no rival of itself."""
-    rivals = tuple(one for one in verdict.rivals if named(one) != named(less))
+    rivals = tuple(one for one in verdict.rivals if named_by(one.effects) != named_by(less.effects))
     return Verdict("missing_effect" if verdict.kind == "ambiguous" and not rivals else verdict.kind, less, rivals)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects.catalogue import catalogue
-from tactile_cube.drivetrain.effects.effect import Effect
+from tactile_cube.drivetrain.effects.effect import Array, Effect
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.criteria import STANDARD
 from tactile_cube.identification.fitting.problem import Problem
@@ -21,7 +21,6 @@ from tactile_cube.measurement.recordings.reading import DESCRIPTION
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model, nominal_model
 
-Array = NDArray[np.float64]
 STANDS_OUT = 5.0  # times what is usual: less hardly moves a fit, and a joint that sticks does it by chance
 USUAL = 0.9  # share of a joint's segments with the usual error: what disturbs more belongs to the machine
 SCATTER = 0.95  # share of a joint's segments whose error exceeds that of another run by no more than is usual

@@ -11,11 +11,10 @@ from typing import Any, Literal
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tactile_cube.drivetrain.effects.catalogue import catalogue
-from tactile_cube.drivetrain.effects.effect import Stage
+from tactile_cube.drivetrain.effects.effect import Array, Stage
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile
 from tactile_cube.errors import InputError
 from tactile_cube.hand.rigid_body import RigidBodyTree
@@ -23,8 +22,6 @@ from tactile_cube.hand.urdf_tree import robot_of
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import nominal_model
 from tactile_cube.measurement.replay.simulator import Simulator
-
-Array = NDArray[np.float64]
 
 
 def _said(silent: float, unit: str) -> Any:
@@ -78,8 +75,7 @@ CONSTANTS = {
     "stiffness": "stiffness",
 }
 """Constants of a model, and the attributes that hold them."""
-OTHERS = {"friction_creep": 0.0, "reading_delay": 0.0}
-"""Other constants of a model, and the values that say nothing."""
+OTHERS = {"friction_creep": 0.0, "reading_delay": 0.0}  # other constants of a model, and the values that say nothing
 
 ADDED = {
     "reflected_inertia": ("excess", "armature"),
@@ -94,8 +90,7 @@ LOWERED = {"rate_limit": ("speed", "rate"), "torque_saturation": ("limit", "torq
 """Effects whose parameter is an attribute's bound."""
 TAKEN = {"back_emf": ("stall", "no_load"), "stribeck_friction": ("excess", "velocity", "exponent")}
 """Effects whose parameters are attributes."""
-OF_LOOP = ("kp", "kd", "torque_limit", "gain")
-"""What grows with the torque's gain."""
+OF_LOOP = ("kp", "kd", "torque_limit", "gain")  # what grows with the torque's gain
 
 
 def drives_of(model: ModelFile) -> list[JointDrive]:
@@ -193,8 +188,7 @@ OF_MECHANISM = ("mass", "com", "inertia", "gravity", "ratio", "offset")
 OF_JOINT = ("kp", "kd", "torque_limit", "armature", "friction", "damping", "delay")
 OF_SERVO = {True: ("stall", "no_load", "rate"), False: ("bias",)}
 """Further attributes that the actuator of a position controller holds, as a servo or not."""
-STEP = 1e-4
-"""Longest time step [s]: MuJoCo's Euler acts half a step early, 0.15 mrad at 3 rad/s."""
+STEP = 1e-4  # longest time step [s]: MuJoCo's Euler acts half a step early, 0.15 mrad at 3 rad/s
 DRY = 'solreffriction="0.002 1" solimpfriction="0.999 0.9999 0.001 0.5 2"'
 """Dry friction as hard as the time step allows: MuJoCo's own lets a held joint creep."""
 Mode = Literal["position", "torque", "voltage"]
@@ -203,8 +197,7 @@ COMMANDS = {
     "torque": "commands are torques [N m]",
     "voltage": "commands are voltages, as the torque they make at standstill [N m]",
 }
-LIGHTEST = 1e-9
-"""Mass [kg] and moment [kg m^2] that MuJoCo wants of a moving body at least."""
+LIGHTEST = 1e-9  # mass [kg] and moment [kg m^2] that MuJoCo wants of a moving body at least
 
 
 def as_mjcf(model: ModelFile, recording: Recording) -> tuple[str, list[str]]:

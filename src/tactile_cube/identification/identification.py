@@ -15,6 +15,7 @@ from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.resolution import Fitted, resolved
 from tactile_cube.identification.search.candidates import candidates
 from tactile_cube.identification.search.evidence import Judgement
+from tactile_cube.identification.search.proposals import MORE_STEPS, stepped
 from tactile_cube.identification.search.residual_starts import residual_candidates
 from tactile_cube.identification.search.search import Search
 from tactile_cube.identification.verdict import final_model
@@ -168,7 +169,8 @@ def with_effect(search: Search, frozen: Fit, effect: type[Effect], joint: str, p
     if parameters and not (having := [c for c in options if set(parameters) <= c.form.keys()]):
         neutral = {p.name: p.neutral for p in effect.parameters if p.name in parameters}
         having = [replace(c, form={**neutral, **c.form}) for c in options]
-    refitted = [search.refit(frozen, option)[1] for option in (having if parameters else options)]
+    wanted = having if parameters else options
+    refitted = [stepped(search.problem, frozen, option, MORE_STEPS)[1] for option in wanted]
     best = min(one.cost for one in refitted)
     same = best + CHI_SQUARED_95 * noise_inflation(search.problem, best)
     return next(one for one in refitted if one.cost <= same)

@@ -10,10 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import polars as pl
-from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
-from tactile_cube.drivetrain.effects.effect import Scales
+from tactile_cube.drivetrain.effects.effect import Array, Scales
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.gauss_newton import Fit, precision
 from tactile_cube.identification.fitting.problem import Problem, Shooting
@@ -25,7 +24,6 @@ from tactile_cube.measurement.recordings.trial import Trial
 from tactile_cube.measurement.replay.model import Model
 from tactile_cube.whole_file import write_whole
 
-Array = NDArray[np.float64]
 FILE = "next_experiment.csv"
 
 

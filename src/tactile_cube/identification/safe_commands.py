@@ -6,20 +6,17 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_cube.identification.fitting.gauss_newton import Fit, precision
 from tactile_cube.identification.fitting.problem import Shooting
 from tactile_cube.identification.fitting.resolution import NORMAL_95
 from tactile_cube.identification.fitting.unknowns import Unknown, put_all, read_all
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.recordings.trial import Trial
+from tactile_cube.measurement.recordings.trial import Array, Trial
 from tactile_cube.measurement.replay.model import Model, no_offsets
 
-Array = NDArray[np.float64]
 QUANTITIES = ("position", "speed", "torque")
-TRIALS = "trials"
-"""Source of a limit that nobody states: no further, faster or harder than the trials already went."""
+TRIALS = "trials"  # source of a limit that nobody states: no further, faster or harder than the trials already went
 ROUNDING = 1e-9
 FILLER = 1000.0  # times what the trials reached: a number that fills a field of a URDF, such as 1e9, and limits nothing
 
@@ -229,11 +226,6 @@ class Safety:
     def allowed(self) -> Envelope:
         """The limits less the margin."""
         return self.limits.allowed(self.margin)
-
-    @property
-    def share_used(self) -> float:
-        """The largest part of what is allowed that is used, in any model."""
-        return share_used(self.reached, self.allowed)
 
     @property
     def safe(self) -> bool:

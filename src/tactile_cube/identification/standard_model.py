@@ -8,16 +8,13 @@ smoothness of nonlinear system identification, Automatica 121, 2020 (windows tha
 benchmark, 2019 (friction by direction).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects import find_effect
-from tactile_cube.drivetrain.effects.effect import Effect, Scales
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Scales
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.criteria import STANDARD
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit
@@ -33,15 +30,13 @@ from tactile_cube.measurement.replay.model import Model, Term, nominal_model
 from tactile_cube.measurement.replay.windows import Windows, between_steps
 from tactile_cube.measurement.units import milli
 
-Array = NDArray[np.float64]
 WINDOWS = (0.05, 0.2, 1.0, 4.0)  # [s] of a finger: short windows for poor start values, long ones for slow effects
 FEWEST_ROWS = 8
 LONGEST_FITTED = 24.0  # [s] of a finger by the number of joints: enough data for a first answer
 ROUNDS, ITERATIONS = 2, 6  # of the robust weights in windows of one length; Gauss-Newton steps in each
 OUTLYING = 2.0  # robust standard deviations from which on an error counts in proportion, not squared
 NORMAL_MEDIAN = 0.6745  # median of the absolute value of a standard normal number
-Laws = Mapping[str, tuple[str, ...]]
-"""Effect -> parameters that are fitted."""
+Laws = Mapping[str, tuple[str, ...]]  # effect -> parameters that are fitted
 PLAIN: Laws = {
     "torque_gain": ("error",),
     "payload": ("mass",),
@@ -77,24 +72,35 @@ def spreads(scales: Scales) -> dict[str, float]:
 
 
 @dataclass(frozen=True)
-class StandardModel:
-    """Fitted standard model, and its errors.
+class Tried:
+    """A model that was tried.
 
     Attributes:
         model: with those effects that are found otherwise than stated; what is stated where no fit was better.
+        error: RMS of free runs of the held-out trials [rad].
+        rows: of the windows in which it was fitted.
         fit: on the trials to fit, in the windows that did best; None where no fit was better.
-        effects: those of the model, each at one joint.
         half_width: (P,) of the 95 % interval of each of the fit's unknowns.
-        stated_error: RMS of free runs of the held-out trials as stated [rad].
-        error: the same of this model [rad].
     """
 
     model: Model
-    fit: Fit | None = field(repr=False)
-    effects: tuple[Candidate, ...]
-    half_width: Array = field(repr=False)
-    stated_error: float
     error: float
+    rows: int = 0
+    fit: Fit | None = field(default=None, repr=False)
+    half_width: Array = field(default_factory=lambda: np.zeros(0), repr=False)
+
+
+@dataclass(frozen=True, kw_only=True)
+class StandardModel(Tried):
+    """Fitted standard model.
+
+    Attributes:
+        effects: those of the model, each at one joint.
+        stated_error: the error as stated [rad].
+    """
+
+    effects: tuple[Candidate, ...]
+    stated_error: float
 
     @property
     def proposal(self) -> Proposal | None:
@@ -107,8 +113,12 @@ class StandardModel:
         if self.fit is None:
             return ()
         first = len(self.model.terms) - len(self.effects)
-        sure = certainties(self.model, self.fit, self.half_width)
-        return tuple(t.label for k, t in enumerate(self.model.terms) if k >= first and sure.get(k, 0.0) > 1.0)
+        sure = {
+            u.place
+            for u, width in zip(self.fit.unknowns, self.half_width, strict=True)
+            if u.kind == "effect" and abs(u.of(self.model) - u.neutral) / max(float(width), np.finfo(float).tiny) > 1.0
+        }
+        return tuple(t.label for k, t in enumerate(self.model.terms) if k >= first and k in sure)
 
     def sentence(self, unit: str) -> str:
         """Return the first result as a line for the terminal; `unit` of the positions: rad or m."""
@@ -153,18 +163,18 @@ class _Fitting:
 
     def run(self) -> StandardModel:
         """Fit the plain model in growing windows, add laws by direction if better, then remove effects not needed."""
-        stated = self.judge.error(self.start)
-        best = _Tried(self.start, stated)
+        stated = best = Tried(self.start, self.judge.error(self.start))
         for laws, gain in ((PLAIN, 0.0), (BY_DIRECTION, STANDARD.detail)):
             best = self.grown(best, laws, gain)
-        if best.fit is None:
-            return StandardModel(self.start, None, (), np.zeros(0), stated, stated)
-        best = self.needed(best)
-        return StandardModel(best.model, best.fit, self.added(best.model), best.half_width, stated, best.error)
+        best = self.needed(best) if best.fit else best
+        return StandardModel(**vars(best), effects=self.added(best.model), stated_error=stated.error)
 
-    def grown(self, before: _Tried, laws: Laws, gain: float) -> _Tried:
+    def grown(self, before: Tried, laws: Laws, gain: float) -> Tried:
         """Fit these laws too, in growing windows or those of the previous fit; return that fit if none is better."""
-        best, model = before, self.with_laws(before.model, laws)
+        best, model = before, before.model
+        for name, parameters in laws.items():
+            for joint in self.recording.joints:
+                model = with_law(model, find_effect(name), joint, parameters, self.shooting.sizes[joint])
         longest = max(len(trial.time) for trial in self.recording.trials)
         growing = [self.rows_of(seconds) for seconds in WINDOWS]
         lengths = [before.rows] if before.rows else growing
@@ -180,7 +190,7 @@ class _Fitting:
         rows = round(seconds * self.shooting.time / self.recording.step)
         return between_steps(self.recording.trials, rows, self.shooting.time)
 
-    def robust(self, model: Model, rows: int, rounds: int = ROUNDS) -> _Tried:
+    def robust(self, model: Model, rows: int, rounds: int = ROUNDS) -> Tried:
         """Fit in windows of so many rows with a soft-L1 loss, by iterative reweighting."""
         segments = max(
             1, round(LONGEST_FITTED * self.shooting.time / (len(self.recording.joints) * rows * self.recording.step))
@@ -193,7 +203,7 @@ class _Fitting:
             found = fit(problem, model, unknowns, ITERATIONS)
             model = found.model
         half_width = NORMAL_95 * standard_errors(problem, found) * np.array([u.scale for u in unknowns])
-        return _Tried(model, self.judge.error(model), rows, found, half_width)
+        return Tried(model, self.judge.error(model), rows, found, half_width)
 
     def weighted(self, windows: Windows, model: Model) -> Problem:
         """Return the problem of windows, weighted by a soft-L1 loss of a model's errors."""
@@ -204,7 +214,7 @@ class _Fitting:
         problem.linearise_starts(model)
         return problem
 
-    def needed(self, best: _Tried) -> _Tried:
+    def needed(self, best: Tried) -> Tried:
         """Remove the effects that are as stated, then those in proportion with a torque constant."""
         assert best.fit is not None, "what is stated has nothing to take out"
         best = self.without(best, self.needless(best))
@@ -212,13 +222,13 @@ class _Fitting:
         fewer = self.without(best, plain)
         return self.without(fewer, self.needless(fewer)) if fewer is not best else best
 
-    def needless(self, tried: _Tried) -> set[str]:
+    def needless(self, tried: Tried) -> set[str]:
         """Return the added effects that are as stated."""
         assert tried.fit is not None, "what is stated has no covariance"
         terms = tried.model.terms
         return {terms[k].label for k in needless(tried.model, tried.fit, tried.half_width, len(self.start.terms))}
 
-    def without(self, best: _Tried, labels: set[str]) -> _Tried:
+    def without(self, best: Tried, labels: set[str]) -> Tried:
         """Refit the model without some effects; return it unchanged if that is worse."""
         if not labels:
             return best
@@ -234,34 +244,6 @@ class _Fitting:
             Candidate(t.effect, (t.joint,), {key: t.values[key] for key in t.fitted}, self.shooting.sizes)
             for t in model.terms[len(self.start.terms) :]
         )
-
-    def with_laws(self, model: Model, laws: Laws) -> Model:
-        """Return the model with these laws at every joint; for laws it already has, free these parameters too."""
-        for name, parameters in laws.items():
-            for joint in self.recording.joints:
-                model = with_law(model, find_effect(name), joint, parameters, self.shooting.sizes[joint])
-        return model
-
-
-@dataclass(frozen=True)
-class _Tried:
-    """A model, its error on the held-out trials [rad], and the fit that it comes from, in windows of so many rows."""
-
-    model: Model
-    error: float
-    rows: int = 0
-    fit: Fit | None = None
-    half_width: Array = field(default_factory=lambda: np.zeros(0))
-
-
-def certainties(model: Model, found: Fit, half_width: Array) -> dict[int, float]:
-    """Return index of a term -> how far its fitted numbers are from changing nothing, at most, in half widths (P,)."""
-    sure: dict[int, float] = {}
-    for u, width in zip(found.unknowns, half_width, strict=True):
-        if u.kind == "effect":
-            distance = abs(u.of(model) - u.neutral) / max(float(width), np.finfo(float).tiny)
-            sure[u.place] = max(sure.get(u.place, 0.0), float(distance))
-    return sure
 
 
 def with_law(model: Model, effect: type[Effect], joint: str, parameters: tuple[str, ...], scales: Scales) -> Model:

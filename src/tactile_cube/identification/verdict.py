@@ -14,7 +14,7 @@ from tactile_cube.identification.search.explanation import (
     complete,
     contains,
     nameable,
-    named,
+    named_by,
     proven,
     simplest,
     sound,
@@ -74,7 +74,7 @@ def closest(found: Sequence[Explanation], findings: Findings, criteria: Criteria
     possible = [findings.base, *found, *unclear]
     best = min(possible, key=lambda one: one.judgement.costs.sum()).judgement
     alike = [one for one in possible if standing_out(likelihood(one.judgement, best), best) <= 1.0]
-    return min(alike, key=lambda one: (len(named(one)), one.size, one.judgement.costs.sum()))
+    return min(alike, key=lambda one: (len(named_by(one.effects)), one.size, one.judgement.costs.sum()))
 
 
 def find_rivals(
@@ -82,11 +82,12 @@ def find_rivals(
 ) -> tuple[Explanation, ...]:
     """Return sets of as few effects and parameters in the band of the chosen one, containing neither it nor a rival."""
     rivals: dict[frozenset[tuple[str, str]], Explanation] = {}
+    own = named_by(chosen.effects)
     for other in sorted(found, key=lambda e: e.judgement.costs.sum()):
-        other_law = named(other) != named(chosen) and len(named(other)) <= len(named(chosen))
-        other_law &= other.size <= chosen.size + 1
+        names = named_by(other.effects)
+        other_law = names != own and len(names) <= len(own) and other.size <= chosen.size + 1
         if other_law and not contains(other, chosen) and not worse(other.judgement, chosen.judgement, criteria):
-            rivals.setdefault(named(other), other)
+            rivals.setdefault(names, other)
     return tuple(one for one in rivals.values() if not any(contains(one, other) for other in rivals.values()))
 
 

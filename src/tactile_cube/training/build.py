@@ -36,10 +36,8 @@ from tactile_cube.training.trial import Trial
 from tactile_cube.transforms import EnvConfig, make_env
 
 POLICY_SUFFIX = ".safetensors"
-FROZEN = 3000
-"""Updates that leave the actor of a policy file as it is, unless training.actor_frozen says otherwise."""
-TRIM_THRESHOLD, TOP_PAD, MMAP_THRESHOLD = -1, -2, -3
-"""Numbers of glibc's mallopt."""
+FROZEN = 3000  # updates that leave the actor of a policy file as it is, unless training.actor_frozen says otherwise
+TRIM_THRESHOLD, TOP_PAD, MMAP_THRESHOLD = -1, -2, -3  # numbers of glibc's mallopt
 
 
 @dataclass(frozen=True)

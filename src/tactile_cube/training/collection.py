@@ -33,12 +33,10 @@ from tactile_cube.training.settings import CollectorSettings
 T = TypeVar("T")
 MakeEnv = Callable[..., EnvBase]
 """make_env(worlds=n, seed=s) -> batched environment of n worlds whose first transform is a `Curriculum`."""
-Progress = tuple[Any, ...]
-"""What `Curriculum.set_progress` takes."""
+Progress = tuple[Any, ...]  # what `Curriculum.set_progress` takes
 GLANCE = 0.5
 """How long a dead worker may go unnoticed [s]; siblings that inherited its pipe would hide its death for ever."""
-LAST_START = 3.0
-"""How long a start that is given up may go on making processes [s]."""
+LAST_START = 3.0  # how long a start that is given up may go on making processes [s]
 
 
 class CollectionError(RuntimeError):
@@ -284,8 +282,7 @@ class MultiSyncCollection:
             process.join(1.0)
 
 
-Collection = SingleCollection | MultiSyncCollection
-"""A source of blocks of experience (worlds, steps)."""
+Collection = SingleCollection | MultiSyncCollection  # a source of blocks of experience (worlds, steps)
 
 
 class WeightSync(SharedMemWeightSyncScheme):  # type: ignore[misc]

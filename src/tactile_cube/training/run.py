@@ -24,10 +24,8 @@ from tactile_cube.whole_file import write_whole
 
 FILE, POLICY, BEST_POLICY, FILM = "finished.json", "policy.safetensors", "policy_best.safetensors", "trial.gif"
 INTERRUPTED = "interrupted"
-MASTERED = "mastered:"
-"""First words of the reason if a run ended because it reached its goal."""
-ATTEMPTS = 3
-"""Times in a row that workers may fail without a barrier reached in between."""
+MASTERED = "mastered:"  # first words of the reason if a run ended because it reached its goal
+ATTEMPTS = 3  # times in a row that workers may fail without a barrier reached in between
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,7 @@ from torchrl.data import MultiStep
 
 from tactile_cube.randomization import Learnability
 
-WINDOW = 50
-"""Episodes, and blocks of steps, that the statistics go back."""
+WINDOW = 50  # episodes, and blocks of steps, that the statistics go back
 WINDOWS = ("angles", "lengths", "endings", "measured")
 
 

@@ -1,7 +1,5 @@
 """Trials of a policy during training: without exploration, in worlds that stay the same throughout."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -18,10 +16,8 @@ from tactile_cube.transforms import EnvConfig
 from tactile_cube.visualization.episode_recording import write_film
 
 ENGINES = ("bullet", "mujoco")
-SEED = 20_264
-"""Seed of the trials' worlds; final evaluations (conf/experiment) and trainings have others."""
-SCORE = "score"
-"""Mean over engines and episodes of the final angle [rad], 0 where the object is lost."""
+SEED = 20_264  # seed of the trials' worlds; final evaluations (conf/experiment) and trainings have others
+SCORE = "score"  # mean over engines and episodes of the final angle [rad], 0 where the object is lost
 
 
 def measured(summary: Summary) -> dict[str, float]:

@@ -1,7 +1,5 @@
 """Curriculum: the conditions of episodes, from easy to hard as training goes on."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

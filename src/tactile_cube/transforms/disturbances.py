@@ -1,7 +1,5 @@
 """Disturbances of sensing and acting: joint offsets, sensor noise, sticky actions; all draw from torch's generator."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import torch

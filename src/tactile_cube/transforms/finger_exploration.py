@@ -1,7 +1,5 @@
 """Extra exploration that lifts fingers: noise on single joints hardly ever lets go of the cube and grasps it anew."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import torch

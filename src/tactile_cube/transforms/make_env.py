@@ -1,7 +1,5 @@
 """The training environment: worlds, transforms in their order, and a generator of its own for the noise."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -60,8 +58,7 @@ class OwnGeneratorEnv(TransformedEnv):  # type: ignore[misc]
             self._generator = torch.get_rng_state()
 
 
-ALMOST_ALL = 1.0 - 1e-9
-"""The fraction of draws below what counts as a distribution's largest value."""
+ALMOST_ALL = 1.0 - 1e-9  # the fraction of draws below what counts as a distribution's largest value
 DEEPEST_STACK = 1_000
 PARTS: Mapping[str, tuple[type, ...]] = {
     "task": (Task,),

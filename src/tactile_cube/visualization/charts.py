@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from io import BytesIO, StringIO
 from pathlib import Path
 from typing import Any
@@ -34,17 +33,6 @@ STYLE: Any = {
     "axes.edgecolor": "#d0d7de", "grid.color": GRID, "axes.labelcolor": FLOOR, "text.color": "#1b1f24",
     "xtick.color": FLOOR, "ytick.color": FLOOR, "xtick.major.size": 0, "ytick.major.size": 0, "legend.frameon": False,
 }  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Interval:
-    """A value with its interval."""
-
-    name: str
-    value: float
-    low: float
-    high: float
-    unit: str
 
 
 @matplotlib.rc_context(STYLE)
@@ -119,18 +107,20 @@ def heat_map(rows: Sequence[str], columns: Sequence[str], values: Sequence[Seque
 
 
 @matplotlib.rc_context(STYLE)
-def interval_chart(intervals: Sequence[Interval]) -> str:
-    """Draw one row per value, each on an axis of its own: the interval as a bar, the value as a dot."""
+def interval_chart(intervals: Sequence[tuple[str, float, float, float, str]]) -> str:
+    """Draw one row per value, each on an axis of its own: the interval as a bar, the value as a dot.
+
+    A row is given as name, value, low, high and unit.
+    """
     axes = empty_chart(ROW * len(intervals) + 12, left=330, right=250, top=6, bottom=6)
-    for row, one in enumerate(intervals):
-        known = [one.low, one.high, one.value]
-        width = (max(known) - min(known)) or 1.0
-        low, high, value = [(place - min(known)) / width for place in known]
-        axes.hlines(row, low, high, color="#80b9d9", linewidth=7)
-        axes.plot(value, row, "o", color=SIMULATED)
-        label = f"{one.value:.4g} {one.unit} [{one.low:.4g}, {one.high:.4g}]"
+    for row, (_, value, low, high, unit) in enumerate(intervals):
+        least = min(low, high, value)
+        width = (max(low, high, value) - least) or 1.0
+        axes.hlines(row, (low - least) / width, (high - least) / width, color="#80b9d9", linewidth=7)
+        axes.plot((value - least) / width, row, "o", color=SIMULATED)
+        label = f"{value:.4g} {unit} [{low:.4g}, {high:.4g}]"
         axes.annotate(label, (1, row), (14, 0), axes.get_yaxis_transform(), textcoords="offset points", va="center")
-    axes.set(yticks=range(len(intervals)), yticklabels=[one.name for one in intervals], xticks=[], xlim=(-0.08, 1.08))
+    axes.set(yticks=range(len(intervals)), yticklabels=[name for name, *_ in intervals], xticks=[], xlim=(-0.08, 1.08))
     axes.set_ylim(len(intervals) - 0.5, -0.5)
     axes.tick_params(labelcolor="#1b1f24")
     axes.spines[:].set_visible(False)

@@ -6,16 +6,14 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
-from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.comparing.comparison import Comparison
 from tactile_cube.measurement.units import SMALL, milli, shown
-from tactile_cube.visualization.charts import marked
+from tactile_cube.visualization.charts import Array, marked
 from tactile_cube.visualization.comparison_report import outcome
 from tactile_cube.visualization.rerun_recording import Branch, log_robot, recording_file, whole
 
-Array = NDArray[np.float64]
 POSE_RATE = 50.0  # [Hz] of the robot's poses
 SIGNAL_RATE = 250.0  # [Hz] of the signals at most
 PAUSE = 1.0  # [s] between two trials on the time line

@@ -10,7 +10,7 @@ from tactile_cube.identification.search.residual_shape import Shape
 from tactile_cube.measurement.comparing.comparison import Comparison
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.units import SMALL, TURNS, common_unit, milli, named, of_joint, short
-from tactile_cube.visualization.charts import PALETTE, SIMULATED, Interval, bar_chart, interval_chart, svg, time_chart
+from tactile_cube.visualization.charts import PALETTE, SIMULATED, bar_chart, interval_chart, svg, time_chart
 from tactile_cube.visualization.comparison_report import (
     overlay_section,
     probability,
@@ -30,6 +30,7 @@ STAGES = {
 }
 MOST_RANKED = 15
 COLUMNS = {
+    "effects": "effects",
     "held_out_error_over_noise": "held-out error / sensor noise",
     "gain": "share of the squared error it takes off",
     "p_value": "p (no better than without)",
@@ -42,11 +43,10 @@ HELD = "How the error with an object falls"
 def stage_section(
     stages: Mapping[str, float | None],
     joints: Mapping[str, Mapping[str, float]],
+    units: Mapping[str, str],
     title: str = "How the error falls",
-    units: Mapping[str, str] | None = None,
 ) -> Section:
-    """Show the error after each step, down to the noise floor; `units` are those of the joints, by default rad."""
-    units = units or {}
+    """Show the error after each step, down to the noise floor; `units` are those of the joints."""
     unit, size = SMALL[common_unit(units.values())]
     bars = [(STAGES.get(key, key), size * v) for key, v in stages.items() if key != "noise_floor" and v is not None]
     floor = stages.get("noise_floor")
@@ -69,7 +69,7 @@ def held_section(
     stages: Mapping[str, float], joints: Mapping[str, Mapping[str, float]], units: Mapping[str, str]
 ) -> Section:
     """Show the same for the trials with an object, which refit no constants."""
-    return stage_section({k: v for k, v in stages.items() if k != "refitted"}, joints, HELD, units)
+    return stage_section({k: v for k, v in stages.items() if k != "refitted"}, joints, units, HELD)
 
 
 def effect_section(effects: Sequence[Mapping[str, Any]], units: Mapping[str, str] | None = None) -> list[Section]:
@@ -83,7 +83,7 @@ def effect_section(effects: Sequence[Mapping[str, Any]], units: Mapping[str, str
             one = estimate if isinstance(estimate, Mapping) else estimate.model_dump()
             label = f"{effect['name']}@{place}: {name}"
             unit = of_joint(one["unit"], common_unit((units or {}).get(joint, TURNS) for joint in effect["joints"]))
-            intervals.append(Interval(label, one["value"], one["low"], one["high"], unit))
+            intervals.append((label, one["value"], one["low"], one["high"], unit))
         if "heldout_gain" in effect:
             lines.append(
                 f"{effect['name']}@{place} takes {100 * effect['heldout_gain']:.0f} % off the held-out squared error "
@@ -118,17 +118,17 @@ def shape_section(shapes: Sequence[Shape], units: Mapping[str, str] | None = Non
     return [Section("The shape of what is unexplained", text, blocks)]
 
 
-def ranking_section(ranking: Sequence[Any]) -> list[Section]:
+def ranking_section(ranking: Sequence[Mapping[str, Any]]) -> list[Section]:
     """Return the section of the candidates considered, best first."""
-    rows = [row for row in ranking if isinstance(row, Mapping)][:MOST_RANKED]
+    rows = ranking[:MOST_RANKED]
     if not rows:
         return []
-    keys = [key for key, value in rows[0].items() if isinstance(value, str | int | float)]
+    keys = [key for key in COLUMNS if rows[0].get(key) is not None]
     cells = [
         ["" if (one := row.get(key)) is None else short(one) if isinstance(one, float) else str(one) for key in keys]
         for row in rows
     ]
-    table = Table([COLUMNS.get(key, key) for key in keys], cells)
+    table = Table([COLUMNS[key] for key in keys], cells)
     text = ["Rows without numbers were given up after a first look: others explained more."]
     return [Section("Candidates considered", text, [table], folded=True)]
 
@@ -239,7 +239,7 @@ def diagnosis_report(
         answer=answer(diagnosis | {"shown_in": units}, None),
         tone=TONES.get(diagnosis["verdict"], "warn"),
         sections=[
-            stage_section(diagnosis["error"], diagnosis.get("error_joints", {}), units=units),
+            stage_section(diagnosis["error"], diagnosis.get("error_joints", {}), units),
             *(held_section(one["error"], one["error_joints"], units) for one in [diagnosis.get("contact")] if one),
             *effect_section(diagnosis["effects"], units),
             *shape_section(shapes, units),
@@ -283,7 +283,7 @@ def identification_report(
         f"{milli(steps[-1], unit)}; {milli(stages['noise_floor'] or after.floor.overall, unit)} would be noise alone.",
         tone="good",
         sections=[
-            stage_section(stages, joints, units=units),
+            stage_section(stages, joints, units),
             *effect_section(found, units),
             *further,
             value_section(after),

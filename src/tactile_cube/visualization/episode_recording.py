@@ -33,12 +33,9 @@ FINGER_COLOURS = ((214, 69, 65), (245, 171, 53), (38, 166, 91), (65, 131, 215), 
 JOINT_COLOURS = ((235, 90, 80), (110, 200, 110), (110, 150, 255), (240, 190, 80), (190, 120, 230), (130, 210, 220))
 SIGNALS = {"q": 1.0, "q_m": 0.75, "q_f": 0.6, "q_d": 0.45, "torque": 1.0}
 """Signals at the physics rate, and how bright their lines are."""
-ARROW_LENGTH = 0.03
-"""Length of a contact arrow [m/N]."""
-POSE_RATE = 50.0
-"""Rate of the 3D poses [Hz]: smooth to the eye; the joint signals keep the physics rate."""
-TRAIL = 50
-"""Policy steps for which the way of the object's corner stays visible: 5 s."""
+ARROW_LENGTH = 0.03  # length of a contact arrow [m/N]
+POSE_RATE = 50.0  # rate of the 3D poses [Hz]: smooth to the eye; the joint signals keep the physics rate
+TRAIL = 50  # policy steps for which the way of the object's corner stays visible: 5 s
 
 
 def write_episode(record: EpisodeRecord, path: Path, hand: Hand = DLR_HAND2, summary: str = "") -> None:
@@ -225,8 +222,7 @@ def _cycled(colours: Colours, places: Sequence[int]) -> Colours:
 
 MAX_BYTES = 3_000_000
 MAX_FRAMES = 200
-STRIDE = 2
-"""Policy steps from frame to frame: five frames a second."""
+STRIDE = 2  # policy steps from frame to frame: five frames a second
 PALETTE_FRAMES = 6
 CAPTION_HEIGHT = 22
 TOUCH, FREE = (40, 160, 70), (205, 205, 205)

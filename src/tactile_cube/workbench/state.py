@@ -16,7 +16,7 @@ from tactile_cube.drivetrain.model_file import ModelErrors, ModelFile, write_mod
 from tactile_cube.errors import InputError
 from tactile_cube.identification.diagnosis import Unseen, in_steps, test_errors, unseen
 from tactile_cube.identification.disturbances import in_time
-from tactile_cube.identification.fitting.gauss_newton import Fit, renewed
+from tactile_cube.identification.fitting.gauss_newton import Fit, fit
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.resolution import NORMAL_95, Fitted, standard_errors
 from tactile_cube.identification.identification import with_effect
@@ -173,7 +173,7 @@ class Workbench:
         search, fitted = self.search, self.stage.fit
         problem = Problem(search.shooting, some(search.all_windows, search.segments // LOOKED_AT))
         problem.linearise_starts(fitted.model)
-        frozen = renewed(problem, fitted, *problem.columns(fitted.model, fitted.unknowns))
+        frozen = fit(problem, fitted.model, fitted.unknowns, iterations=0)
         here = [one for one in wanted(search, problem, frozen) if one.joints == (joint,)]
         tried = [one for one in here if f"{effect_path(one.effect)}@{joint}" not in self.effects]
         scores = []

@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks.paper.budget import POLICIES, WORLDS, read_budget
 from benchmarks.paper.page import DIFFERENCES, paper_page
-from benchmarks.paper.rows import HEAD, ROWS, read_comparison
+from benchmarks.paper.rows import HEAD, ROWS, read_comparison, read_results
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.evaluation import FORMAT
 
@@ -106,3 +106,13 @@ def test_the_budgets_terms_add_up_to_the_return() -> None:
     lost = 10.0  # published nowhere, conf/reward/paper.yaml
     for row in rows:
         assert row["return"] == pytest.approx(sum(row[key] for key in total) - lost * (1.0 - row["held"]), abs=0.05)
+
+
+@pytest.mark.parametrize(
+    "content", ["", "[]", "{}", '{"format": "tactile_cube results 1"}', '{"format": "something else"}', "{"]
+)
+def test_other_files_are_refused_by_name(tmp_path: Path, content: str) -> None:
+    path = tmp_path / "results.json"
+    path.write_text(content)
+    with pytest.raises(InputError, match=r"results\.json"):
+        read_results(path)

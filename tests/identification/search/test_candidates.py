@@ -13,7 +13,6 @@ from tactile_cube.identification.search.candidates import (
     Candidate,
     Score,
     candidates,
-    forms,
     resized,
     start,
     with_details,
@@ -96,7 +95,7 @@ def fitted(*names: str, joints: tuple[str, ...] = ("q2",)) -> tuple[list[Candida
     """Effects in their first forms, and a model that has them."""
     effects, model = [], Model({}, (), {})
     for name in names:
-        effects.append(Candidate(find_effect(name), joints, forms(find_effect(name))[0]))
+        effects.append(Candidate(find_effect(name), joints, find_effect(name).forms_at(FINGER)[0]))
         model = effects[-1].added_to(model)[0]
     return effects, model
 

@@ -9,12 +9,11 @@ import pytest
 from tactile_cube.drivetrain.effects import ANGLE, JOINT_TORQUE, find_effect
 from tactile_cube.drivetrain.effects.effect import FINGER
 from tactile_cube.drivetrain.signals import ROWS
-from tactile_cube.identification.search.candidates import forms
 from tactile_cube.identification.search.residual_shape import Missing
 from tactile_cube.identification.search.residual_starts import PROFILE, peaks, start_of
 
 EFFECT = find_effect("position_torque")
-FORM = next(form for form in forms(EFFECT) if PROFILE in form)
+FORM = next(form for form in EFFECT.forms_at(FINGER) if PROFILE in form)
 
 
 def detent(position: np.ndarray) -> np.ndarray:

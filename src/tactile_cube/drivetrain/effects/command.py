@@ -2,20 +2,8 @@
 
 from math import ceil, exp
 
+from tactile_cube.drivetrain import signals as sig
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Scales, Stage
-from tactile_cube.drivetrain.signals import (
-    COMMAND,
-    COMMAND_AFTER,
-    CONTROLLER_TORQUE,
-    DAMPING,
-    DEFLECTION,
-    FRICTION,
-    LOAD,
-    MOTOR_POSITION,
-    TORQUE,
-    VELOCITY,
-    WEIGHT,
-)
 
 DEAD = (0.1, 0.4)  # sizes of a dead zone of the torque at which a search starts, as parts of the usual torque
 
@@ -56,7 +44,7 @@ class CommandDeadZone(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        command = x[COMMAND, j]
+        command = x[sig.COMMAND, j]
         if s[1] == 0.0:
             s[0] = command
             s[1] = 1.0
@@ -66,7 +54,7 @@ class CommandDeadZone(Effect):
         s[0] = command
         if p[0] <= 0.0 and p[1] <= 0.0:
             return command
-        reading = x[MOTOR_POSITION, j] + dt * x[VELOCITY, j]  # the last step's, extrapolated to this step
+        reading = x[sig.MOTOR_POSITION, j] + dt * x[sig.VELOCITY, j]  # the last step's, extrapolated to this step
         difference = command - reading
         if abs(difference) <= p[1]:
             return reading
@@ -76,9 +64,9 @@ class CommandDeadZone(Effect):
 
     @staticmethod
     def torque_law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        if abs(x[TORQUE, j]) < p[4]:
-            x[DAMPING, j] = 0.0
-        return x[TORQUE, j] - min(max(x[TORQUE, j], -p[4]), p[4])
+        if abs(x[sig.TORQUE, j]) < p[4]:
+            x[sig.DAMPING, j] = 0.0
+        return x[sig.TORQUE, j] - min(max(x[sig.TORQUE, j], -p[4]), p[4])
 
 
 RATES = (0.8, 0.4, 0.15)
@@ -114,7 +102,7 @@ class RateLimit(Effect):
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
         """Return the mean of the limited command over a step [rad]."""
-        wanted = x[COMMAND_AFTER, j]
+        wanted = x[sig.COMMAND_AFTER, j]
         if s[1] == 0.0:
             s[0] = s[2] = wanted
             s[1] = 1.0
@@ -122,7 +110,7 @@ class RateLimit(Effect):
         s[2] = wanted
         if abs(wanted - limited) <= step:
             s[0] = wanted
-            return x[COMMAND, j] if limited == before else 0.5 * (limited + wanted)
+            return x[sig.COMMAND, j] if limited == before else 0.5 * (limited + wanted)
         s[0] = limited + min(max(wanted - limited, -step), step)
         return 0.5 * (limited + s[0])
 
@@ -156,10 +144,10 @@ class CommandDelay(Effect):
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
         length = len(s) - 2
         if s[0] == 0.0:
-            s[:] = x[COMMAND, j]
+            s[:] = x[sig.COMMAND, j]
             s[0], s[1] = 1.0, 0.0
         newest = int(s[1])
-        s[2 + newest] = x[COMMAND, j]
+        s[2 + newest] = x[sig.COMMAND, j]
         s[1] = (newest + 1) % length
         steps = min(max(p[0] / dt, 0.0), length - 2.0)
         whole = int(steps)
@@ -204,21 +192,22 @@ class IntegralAction(Effect):
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
         """Return the torque asked for [N m]; the error counts as linear over a step."""
         if p[0] <= 0.0:
-            return x[CONTROLLER_TORQUE, j]
-        reading = x[MOTOR_POSITION, j] + x[DEFLECTION, j]
+            return x[sig.CONTROLLER_TORQUE, j]
+        reading = x[sig.MOTOR_POSITION, j] + x[sig.DEFLECTION, j]
         if s[0] == 0.0:
             s[0] = 1.0
-            braked = x[DAMPING, j] * x[VELOCITY, j]
-            rubbed = x[FRICTION, j] * braked / (abs(braked) + x[FRICTION, j]) if x[FRICTION, j] > 0.0 else 0.0
-            s[1] += x[LOAD, j] + rubbed - x[TORQUE, j]
+            braked = x[sig.DAMPING, j] * x[sig.VELOCITY, j]
+            friction = x[sig.FRICTION, j]
+            rubbed = friction * braked / (abs(braked) + friction) if friction > 0.0 else 0.0
+            s[1] += x[sig.LOAD, j] + rubbed - x[sig.TORQUE, j]
         elif s[0] == 2.0:
             s[0] = 1.0
         else:
-            s[1] += p[0] * (0.5 * dt * (s[2] + x[COMMAND, j] - s[3] - reading) - p[2] * (reading - s[3]))
+            s[1] += p[0] * (0.5 * dt * (s[2] + x[sig.COMMAND, j] - s[3] - reading) - p[2] * (reading - s[3]))
         if p[1] > 0.0:
             s[1] = min(max(s[1], -p[1]), p[1])
-        s[2], s[3] = x[COMMAND, j], reading
-        return x[CONTROLLER_TORQUE, j] + s[1]
+        s[2], s[3] = x[sig.COMMAND, j], reading
+        return x[sig.CONTROLLER_TORQUE, j] + s[1]
 
 
 class GravityCompensation(Effect):
@@ -240,7 +229,7 @@ class GravityCompensation(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        return x[CONTROLLER_TORQUE, j] + p[0] * x[WEIGHT, j]
+        return x[sig.CONTROLLER_TORQUE, j] + p[0] * x[sig.WEIGHT, j]
 
 
 class VelocityFeedforward(Effect):
@@ -269,7 +258,7 @@ class VelocityFeedforward(Effect):
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
         """Return the torque asked for [N m]: its mean over a step of a command that is held."""
         if s[0] == 0.0:
-            s[0], s[1] = 1.0, x[COMMAND, j]
-        followed = (1.0 - exp(-dt / p[1])) * (x[COMMAND, j] - s[1])
+            s[0], s[1] = 1.0, x[sig.COMMAND, j]
+        followed = (1.0 - exp(-dt / p[1])) * (x[sig.COMMAND, j] - s[1])
         s[1] += followed
-        return x[CONTROLLER_TORQUE, j] + p[0] * followed / dt
+        return x[sig.CONTROLLER_TORQUE, j] + p[0] * followed / dt

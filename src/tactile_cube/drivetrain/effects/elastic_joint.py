@@ -4,21 +4,8 @@ from math import pi
 from typing import ClassVar
 
 from tactile_cube.compiled import compiled
+from tactile_cube.drivetrain import signals as sig
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Scales, Simpler, Stage
-from tactile_cube.drivetrain.signals import (
-    ACCELERATION,
-    DAMPING,
-    FRICTION,
-    INERTIA,
-    JOINT_TORQUE,
-    LOAD,
-    MEASURED_VELOCITY,
-    MOTOR_POSITION,
-    MOTOR_SHARE,
-    SENSOR_VELOCITY,
-    TORQUE,
-    VELOCITY,
-)
 
 RESONANCES = (8.0, 16.0, 32.0)  # where a search starts at a finger [Hz], with half of the joint's inertia in the rotor
 DAMPING_RATIO = 0.03
@@ -32,10 +19,10 @@ def _push(
 
     The link is free to follow, against the friction that is left to it; the other joints stand.
     """
-    link, friction = 2.0 * (x[INERTIA, j] - p[1]) / dt, (1.0 - p[4]) * x[FRICTION, j]
-    follows = 0.0 if pull <= 0.0 or (x[VELOCITY, j] == 0.0 and friction > 0.0) else pull / (link + pull)
-    held = x[LOAD, j] - x[JOINT_TORQUE, j] + (friction if x[VELOCITY, j] > 0.0 else -friction)
-    carried = follows * (link * x[VELOCITY, j] + now - held)
+    link, friction = 2.0 * (x[sig.INERTIA, j] - p[1]) / dt, (1.0 - p[4]) * x[sig.FRICTION, j]
+    follows = 0.0 if pull <= 0.0 or (x[sig.VELOCITY, j] == 0.0 and friction > 0.0) else pull / (link + pull)
+    held = x[sig.LOAD, j] - x[sig.JOINT_TORQUE, j] + (friction if x[sig.VELOCITY, j] > 0.0 else -friction)
+    carried = follows * (link * x[sig.VELOCITY, j] + now - held)
     return own * speed + torque - now + carried - 0.5 * (own + (1.0 - follows) * pull) * speed
 
 
@@ -90,26 +77,26 @@ class ElasticJoint(Effect):
         Relative angle and speed are kept: a simulation that is started anew moves rotor and link together.
         """
         if p[0] <= 0.0:
-            return x[MEASURED_VELOCITY, j]
+            return x[sig.MEASURED_VELOCITY, j]
         if s[2] == 0.0:
             s[2] = 1.0
-            s[0] = p[0] * x[LOAD, j]
-            if p[3] > 0.0 and x[LOAD, j] != 0.0:
-                s[0] += 0.5 * p[3] if x[LOAD, j] > 0.0 else -0.5 * p[3]
+            s[0] = p[0] * x[sig.LOAD, j]
+            if p[3] > 0.0 and x[sig.LOAD, j] != 0.0:
+                s[0] += 0.5 * p[3] if x[sig.LOAD, j] > 0.0 else -0.5 * p[3]
         else:
-            change = dt * x[ACCELERATION, j]
+            change = dt * x[sig.ACCELERATION, j]
             mean = s[4] + s[5] * (s[3] + 0.5 * change)
             s[1] = 2.0 * (mean - s[3]) - s[1] - change
             s[0] += dt * s[1]
-        s[3] = x[VELOCITY, j]
-        x[SENSOR_VELOCITY, j] += s[1]
-        x[MOTOR_SHARE, j] = p[4]
-        return x[MEASURED_VELOCITY, j] + s[1]
+        s[3] = x[sig.VELOCITY, j]
+        x[sig.SENSOR_VELOCITY, j] += s[1]
+        x[sig.MOTOR_SHARE, j] = p[4]
+        return x[sig.MEASURED_VELOCITY, j] + s[1]
 
     @staticmethod
     def ahead_law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
         """Return the rotor's angle [rad]."""
-        return x[MOTOR_POSITION, j] + s[0]
+        return x[sig.MOTOR_POSITION, j] + s[0]
 
     @staticmethod
     def torque_law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
@@ -120,24 +107,24 @@ class ElasticJoint(Effect):
         less the rotor's inertia, which the spring takes off the joint's.
         """
         if p[0] <= 0.0:
-            return x[TORQUE, j]
+            return x[sig.TORQUE, j]
         spring, damping, beyond = 1.0 / p[0], p[2], s[0]
         if p[3] > 0.0:
             beyond -= min(max(s[0], -0.5 * p[3]), 0.5 * p[3])
             if beyond == 0.0:
                 spring = damping = 0.0
-        inertia, speed = 2.0 * p[1] / dt, x[VELOCITY, j] + s[1]
-        own, pull = inertia + x[DAMPING, j] + p[5], 0.5 * dt * spring + damping
+        inertia, speed = 2.0 * p[1] / dt, x[sig.VELOCITY, j] + s[1]
+        own, pull = inertia + x[sig.DAMPING, j] + p[5], 0.5 * dt * spring + damping
         now = spring * (beyond - 0.5 * dt * s[1])
-        torque, most = x[TORQUE, j] - p[5] * speed, p[4] * max(x[FRICTION, j], 0.0)
+        torque, most = x[sig.TORQUE, j] - p[5] * speed, p[4] * max(x[sig.FRICTION, j], 0.0)
         if most > 0.0:
             push = _push(x, j, p, own, speed, torque, pull, now, dt)
             if abs(push) <= most:
                 s[4], s[5] = 0.5 * speed, 0.0
-                x[DAMPING, j] = pull - inertia
-                return now + pull * (s[4] - x[VELOCITY, j])
+                x[sig.DAMPING, j] = pull - inertia
+                return now + pull * (s[4] - x[sig.VELOCITY, j])
             torque -= most if push > 0.0 else -most
         s[5] = pull / (own + pull) if own + pull > 0.0 else 0.0
         s[4] = (own * speed + torque - now) / (own + pull) if own + pull > 0.0 else 0.0
-        x[DAMPING, j] = own * s[5] - inertia
-        return now + pull * s[4] - own * s[5] * x[VELOCITY, j]
+        x[sig.DAMPING, j] = own * s[5] - inertia
+        return now + pull * s[4] - own * s[5] * x[sig.VELOCITY, j]

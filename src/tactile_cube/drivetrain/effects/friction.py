@@ -4,8 +4,8 @@ from dataclasses import replace
 from math import exp, inf
 from typing import ClassVar
 
+from tactile_cube.drivetrain import signals as sig
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Scales, Simpler, Stage
-from tactile_cube.drivetrain.signals import DAMPING, DIRECTION, FRICTION, JOINT_TORQUE, LOAD, TIME, TORQUE, VELOCITY
 
 
 class CoulombFriction(Effect):
@@ -24,7 +24,7 @@ class CoulombFriction(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        return x[FRICTION, j] + p[0]
+        return x[sig.FRICTION, j] + p[0]
 
 
 class StribeckFriction(Effect):
@@ -51,8 +51,8 @@ class StribeckFriction(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        speed = abs(x[VELOCITY, j] / p[1])
-        return x[FRICTION, j] + p[0] * exp(-(speed * speed if p[2] == 2.0 else speed ** p[2]))
+        speed = abs(x[sig.VELOCITY, j] / p[1])
+        return x[sig.FRICTION, j] + p[0] * exp(-(speed * speed if p[2] == 2.0 else speed ** p[2]))
 
 
 class LoadDependentFriction(Effect):
@@ -73,7 +73,7 @@ class LoadDependentFriction(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        return x[FRICTION, j] + p[0] * abs(x[TORQUE, j])
+        return x[sig.FRICTION, j] + p[0] * abs(x[sig.TORQUE, j])
 
 
 class AsymmetricFriction(Effect):
@@ -99,7 +99,7 @@ class AsymmetricFriction(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        return (x[FRICTION, j] + p[2] + 0.5 * p[0] * x[DIRECTION, j]) * (1.0 + p[1] * x[DIRECTION, j])
+        return (x[sig.FRICTION, j] + p[2] + 0.5 * p[0] * x[sig.DIRECTION, j]) * (1.0 + p[1] * x[sig.DIRECTION, j])
 
 
 class FrictionDrift(Effect):
@@ -144,8 +144,8 @@ class FrictionDrift(Effect):
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
         if p[0] == 0.0 and p[2] == 0.0:
-            return x[FRICTION, j]
-        return max(x[FRICTION, j] + p[2] + p[0] * (1.0 - exp(-x[TIME, 0] / p[1])), 0.0)
+            return x[sig.FRICTION, j]
+        return max(x[sig.FRICTION, j] + p[2] + p[0] * (1.0 - exp(-x[sig.TIME, 0] / p[1])), 0.0)
 
 
 FOLLOWED = 5.0  # steps of unseen motion, as long as the present one, that bristles have followed
@@ -190,16 +190,16 @@ class PreslidingFriction(Effect):
         Bristles whose past is not known hold a joint at rest where it is; one that moves they follow.
         """
         if p[0] <= 0.0:
-            return x[FRICTION, j] + p[1]
-        limit = max(x[FRICTION, j] + p[1], 0.0)
-        direction = 1.0 if x[VELOCITY, j] >= 0.0 else -1.0
+            return x[sig.FRICTION, j] + p[1]
+        limit = max(x[sig.FRICTION, j] + p[1], 0.0)
+        direction = 1.0 if x[sig.VELOCITY, j] >= 0.0 else -1.0
         if s[1] > 0.0:
             s[1] = 0.0
-            balance = (x[TORQUE, j] + x[JOINT_TORQUE, j] - x[LOAD, j]) / max(limit, TINY)
+            balance = (x[sig.TORQUE, j] + x[sig.JOINT_TORQUE, j] - x[sig.LOAD, j]) / max(limit, TINY)
             balance = min(max(balance, -1.0), 1.0)
-            s[0] = direction + (balance - direction) * exp(-abs(x[VELOCITY, j]) * FOLLOWED * dt / p[0])
-        s[0] = direction + (s[0] - direction) * exp(-abs(x[VELOCITY, j]) * dt / p[0])
+            s[0] = direction + (balance - direction) * exp(-abs(x[sig.VELOCITY, j]) * FOLLOWED * dt / p[0])
+        s[0] = direction + (s[0] - direction) * exp(-abs(x[sig.VELOCITY, j]) * dt / p[0])
         drag = p[2] * (1.0 - direction * s[0])
-        x[DAMPING, j] += drag
-        x[JOINT_TORQUE, j] -= limit * s[0] + drag * x[VELOCITY, j]
+        x[sig.DAMPING, j] += drag
+        x[sig.JOINT_TORQUE, j] -= limit * s[0] + drag * x[sig.VELOCITY, j]
         return 0.0

@@ -3,8 +3,8 @@
 from math import isfinite, tanh
 from typing import ClassVar
 
+from tactile_cube.drivetrain import signals as sig
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Scales, Simpler, Stage, unit_at
-from tactile_cube.drivetrain.signals import ANGLE, DAMPING, JOINT_TORQUE, POSITION, VELOCITY
 
 
 class ViscousFriction(Effect):
@@ -28,9 +28,9 @@ class ViscousFriction(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        damping = p[0] + (0.5 * p[1] if x[VELOCITY, j] > 0.0 else -0.5 * p[1])
-        x[DAMPING, j] += damping
-        return x[JOINT_TORQUE, j] - damping * x[VELOCITY, j]
+        damping = p[0] + (0.5 * p[1] if x[sig.VELOCITY, j] > 0.0 else -0.5 * p[1])
+        x[sig.DAMPING, j] += damping
+        return x[sig.JOINT_TORQUE, j] - damping * x[sig.VELOCITY, j]
 
 
 class NonlinearDrag(Effect):
@@ -62,11 +62,11 @@ class NonlinearDrag(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        slope = p[0] * abs(x[VELOCITY, j])
+        slope = p[0] * abs(x[sig.VELOCITY, j])
         if p[1] != 2.0:
-            slope *= (abs(x[VELOCITY, j]) / p[2]) ** (p[1] - 2.0) if x[VELOCITY, j] != 0.0 else 0.0
-        x[DAMPING, j] += p[1] * slope
-        return x[JOINT_TORQUE, j] - slope * x[VELOCITY, j]
+            slope *= (abs(x[sig.VELOCITY, j]) / p[2]) ** (p[1] - 2.0) if x[sig.VELOCITY, j] != 0.0 else 0.0
+        x[sig.DAMPING, j] += p[1] * slope
+        return x[sig.JOINT_TORQUE, j] - slope * x[sig.VELOCITY, j]
 
 
 KNOTS = 17
@@ -107,14 +107,14 @@ class PositionTorque(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        place = min(max((x[ANGLE, j] - p[2]) / (p[3] - p[2]) * (KNOTS - 1), 0.0), KNOTS - 1.000001)
+        place = min(max((x[sig.ANGLE, j] - p[2]) / (p[3] - p[2]) * (KNOTS - 1), 0.0), KNOTS - 1.000001)
         knot = int(place)
         u = place - knot
         shape = p[4 + max(knot - 1, 0)] * (1.0 - u) ** 3
         shape += p[4 + knot] * (4.0 - 6.0 * u**2 + 3.0 * u**3)
         shape += p[5 + knot] * (1.0 + 3.0 * u + 3.0 * u**2 - 3.0 * u**3)
         shape += p[4 + min(knot + 2, KNOTS - 1)] * u**3
-        return x[JOINT_TORQUE, j] + p[1] - p[0] * x[ANGLE, j] + shape / 6.0
+        return x[sig.JOINT_TORQUE, j] + p[1] - p[0] * x[sig.ANGLE, j] + shape / 6.0
 
 
 KINDS = (
@@ -165,9 +165,9 @@ class JointCoupling(Effect):
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
         n = x.shape[1]
         a, b = (j - 1) % n, (j + 1) % n
-        torque = x[JOINT_TORQUE, j] + p[0] * x[VELOCITY, a] + p[1] * x[VELOCITY, b]
-        torque += p[2] * tanh(x[VELOCITY, a] / p[6]) + p[3] * tanh(x[VELOCITY, b] / p[6])
-        return torque + p[4] * x[POSITION, a] + p[5] * x[POSITION, b]
+        torque = x[sig.JOINT_TORQUE, j] + p[0] * x[sig.VELOCITY, a] + p[1] * x[sig.VELOCITY, b]
+        torque += p[2] * tanh(x[sig.VELOCITY, a] / p[6]) + p[3] * tanh(x[sig.VELOCITY, b] / p[6])
+        return torque + p[4] * x[sig.POSITION, a] + p[5] * x[sig.POSITION, b]
 
 
 SHARES = (0.03, 0.12, 0.3)
@@ -234,12 +234,12 @@ class JointStop(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        over = x[ANGLE, j] - p[0]
-        under = p[1] - x[ANGLE, j]
+        over = x[sig.ANGLE, j] - p[0]
+        under = p[1] - x[sig.ANGLE, j]
         deep = max(over, under)
         if deep <= 0.0:
-            return x[JOINT_TORQUE, j]
+            return x[sig.JOINT_TORQUE, j]
         spring = p[2] * deep if p[4] == 1.0 else p[2] * p[5] * (deep / p[5]) ** p[4]
         if over > 0.0:
-            return x[JOINT_TORQUE, j] - max(spring + p[3] * x[VELOCITY, j], 0.0)
-        return x[JOINT_TORQUE, j] + max(spring - p[3] * x[VELOCITY, j], 0.0)
+            return x[sig.JOINT_TORQUE, j] - max(spring + p[3] * x[sig.VELOCITY, j], 0.0)
+        return x[sig.JOINT_TORQUE, j] + max(spring - p[3] * x[sig.VELOCITY, j], 0.0)

@@ -6,8 +6,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from tactile_cube.drivetrain import signals as sig
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Scales, Simpler, Stage, harmonic, unit_at
-from tactile_cube.drivetrain.signals import ACCELERATION, ANGLE, DAMPING, JOINT_TORQUE, TORQUE, VELOCITY
 
 
 class TorqueGain(Effect):
@@ -27,8 +27,8 @@ class TorqueGain(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        x[DAMPING, j] *= 1.0 + p[0]
-        return x[TORQUE, j] * (1.0 + p[0])
+        x[sig.DAMPING, j] *= 1.0 + p[0]
+        return x[sig.TORQUE, j] * (1.0 + p[0])
 
 
 SMALLEST = 0.01  # part of `reference` below which the curve is a straight line to zero
@@ -66,11 +66,11 @@ class TorqueCurve(Effect):
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
         if p[0] == 0.0 and p[1] == 0.0:
-            return x[TORQUE, j]
-        load = abs(x[TORQUE, j]) / p[2]
+            return x[sig.TORQUE, j]
+        load = abs(x[sig.TORQUE, j]) / p[2]
         factor = (1.0 + p[1]) * max(load, SMALLEST) ** p[0]
-        x[DAMPING, j] *= factor * (1.0 + p[0] if load > SMALLEST else 1.0)
-        return x[TORQUE, j] * factor
+        x[sig.DAMPING, j] *= factor * (1.0 + p[0] if load > SMALLEST else 1.0)
+        return x[sig.TORQUE, j] * factor
 
 
 class TorqueBias(Effect):
@@ -89,7 +89,7 @@ class TorqueBias(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        return x[TORQUE, j] + p[0]
+        return x[sig.TORQUE, j] + p[0]
 
 
 class TorqueCrosstalk(Effect):
@@ -119,7 +119,7 @@ class TorqueCrosstalk(Effect):
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
         n = x.shape[1]
-        return x[TORQUE, j] + p[0] * x[TORQUE, (j - 1) % n] + p[1] * x[TORQUE, (j + 1) % n]
+        return x[sig.TORQUE, j] + p[0] * x[sig.TORQUE, (j - 1) % n] + p[1] * x[sig.TORQUE, (j + 1) % n]
 
 
 RIPPLE = "1-5 % of the rating"
@@ -167,20 +167,20 @@ class Cogging(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        angle = p[2] * x[ANGLE, j]
+        angle = p[2] * x[sig.ANGLE, j]
         if p[3] == 0.0 and p[4] == 0.0:
-            return x[JOINT_TORQUE, j]
+            return x[sig.JOINT_TORQUE, j]
         ripple = p[3] * sin(angle) + p[4] * cos(angle)
         ripple += p[5] * sin(2 * angle) + p[6] * cos(2 * angle) + p[7] * sin(3 * angle) + p[8] * cos(3 * angle)
-        return x[JOINT_TORQUE, j] + ripple
+        return x[sig.JOINT_TORQUE, j] + ripple
 
     @staticmethod
     def torque_law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        angle = p[2] * x[ANGLE, j]
+        angle = p[2] * x[sig.ANGLE, j]
         ripple = p[0] * sin(angle) + p[1] * cos(angle)
         if p[3] == 0.0 and p[4] == 0.0:
             ripple += p[5] * sin(2 * angle) + p[6] * cos(2 * angle) + p[7] * sin(3 * angle) + p[8] * cos(3 * angle)
-        return x[TORQUE, j] + ripple
+        return x[sig.TORQUE, j] + ripple
 
 
 class ActuatorLag(Effect):
@@ -208,19 +208,19 @@ class ActuatorLag(Effect):
         The torque asked for depends on the speed in the middle of a step. The last step's state is moved to its end
         before it is used.
         """
-        asked = x[TORQUE, j]
+        asked = x[sig.TORQUE, j]
         if p[0] <= 0.0:
             return asked
         if s[1] == 0.0:
             s[0] = asked
             s[1] = 1.0
             s[2] = asked
-        later = 0.5 * dt * x[DAMPING, j] * x[ACCELERATION, j]
+        later = 0.5 * dt * x[sig.DAMPING, j] * x[sig.ACCELERATION, j]
         s[0] -= s[3] * later
         s[2] -= later
         kept = exp(-dt / p[0])
         mean = (1.0 - kept) * p[0] / dt
-        x[DAMPING, j] *= 1.0 - mean
+        x[sig.DAMPING, j] *= 1.0 - mean
         s[0] = kept * s[0] + (mean - kept) * s[2] + (1.0 - mean) * asked
         s[2] = asked
         s[3] = 1.0 - mean
@@ -271,12 +271,12 @@ class TorqueSaturation(Effect):
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
         if p[1] > HARD:
-            asked = 1.0 + abs(x[TORQUE, j] / p[0]) ** (1.0 / p[1])
-            x[DAMPING, j] *= asked ** -(p[1] + 1.0)
-            return x[TORQUE, j] * asked ** -p[1]
-        if abs(x[TORQUE, j]) > p[0]:
-            x[DAMPING, j] = 0.0
-        return min(max(x[TORQUE, j], -p[0]), p[0])
+            asked = 1.0 + abs(x[sig.TORQUE, j] / p[0]) ** (1.0 / p[1])
+            x[sig.DAMPING, j] *= asked ** -(p[1] + 1.0)
+            return x[sig.TORQUE, j] * asked ** -p[1]
+        if abs(x[sig.TORQUE, j]) > p[0]:
+            x[sig.DAMPING, j] = 0.0
+        return min(max(x[sig.TORQUE, j], -p[0]), p[0])
 
 
 UNLIMITED = 1e9  # neutral value of `stall`: a supply that is never too weak
@@ -313,10 +313,10 @@ class BackEmf(Effect):
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
         if p[0] >= UNLIMITED:
-            return x[TORQUE, j]
+            return x[sig.TORQUE, j]
         slope = p[0] / p[1]
-        lost = slope * x[VELOCITY, j]
-        torque = min(max(x[TORQUE, j], -p[0] - lost), p[0] - lost)
-        if torque != x[TORQUE, j]:
-            x[DAMPING, j] = slope
+        lost = slope * x[sig.VELOCITY, j]
+        torque = min(max(x[sig.TORQUE, j], -p[0] - lost), p[0] - lost)
+        if torque != x[sig.TORQUE, j]:
+            x[sig.DAMPING, j] = slope
         return torque

@@ -7,6 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from tactile_cube.compiled import compiled
+from tactile_cube.drivetrain import signals as sig
 from tactile_cube.drivetrain.effects.effect import (
     Array,
     Effect,
@@ -17,20 +18,6 @@ from tactile_cube.drivetrain.effects.effect import (
     Stage,
     View,
     harmonic,
-)
-from tactile_cube.drivetrain.signals import (
-    ACCELERATION,
-    ANGLE,
-    DAMPING,
-    DEFLECTION,
-    GAP,
-    LEAD,
-    LOOP_GAIN,
-    LOOSE_TORQUE,
-    MEASURED_VELOCITY,
-    MOTOR_POSITION,
-    POSITION,
-    TORQUE,
 )
 
 
@@ -64,7 +51,7 @@ class VelocityFilterLag(Effect):
 
         The speed of a step is that of its middle. The last step's state is moved to its end before it is used.
         """
-        asked = x[MEASURED_VELOCITY, j]
+        asked = x[sig.MEASURED_VELOCITY, j]
         if p[0] <= 0.0:
             return asked
         if s[0] == 0.0:
@@ -72,7 +59,7 @@ class VelocityFilterLag(Effect):
             s[1] = asked
             s[2] = asked
             s[4] = asked
-        later = 0.5 * dt * x[ACCELERATION, j]
+        later = 0.5 * dt * x[sig.ACCELERATION, j]
         before = s[1] + later
         s[1] = asked
         for k in range(2, 6, 2):
@@ -82,7 +69,7 @@ class VelocityFilterLag(Effect):
                 last = s[k] + later
                 kept = exp(-dt / time_constant)
                 mean = (1.0 - kept) * time_constant / dt
-                x[DAMPING, j] *= 1.0 - mean
+                x[sig.DAMPING, j] *= 1.0 - mean
                 s[k] = kept * last + (mean - kept) * before + (1.0 - mean) * asked
                 s[k + 1] = 1.0 - mean
                 before, asked = last, s[k]
@@ -156,8 +143,8 @@ class StiffeningElasticity(Effect):
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
         """Return the deflection q_m - q [rad]: the real root of cubic * d^3 + K d = tau (Cardano)."""
-        torque = x[TORQUE, j]
-        deflection = x[DEFLECTION, j] + p[0] * torque
+        torque = x[sig.TORQUE, j]
+        deflection = x[sig.DEFLECTION, j] + p[0] * torque
         if p[1] <= 0.0 or torque * deflection <= 0.0:
             return deflection
         linear = torque / deflection / p[1]
@@ -187,8 +174,8 @@ class TransmissionError(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        angle = p[2] * x[ANGLE, j]
-        return x[MOTOR_POSITION, j] + p[0] * sin(angle) + p[1] * cos(angle)
+        angle = p[2] * x[sig.ANGLE, j]
+        return x[sig.MOTOR_POSITION, j] + p[0] * sin(angle) + p[1] * cos(angle)
 
 
 class PositionOffset(Effect):
@@ -208,7 +195,7 @@ class PositionOffset(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        return x[MOTOR_POSITION, j] + p[0]
+        return x[sig.MOTOR_POSITION, j] + p[0]
 
 
 NEWTON_STEPS = 12
@@ -292,31 +279,31 @@ class Backlash(Effect):
     def ahead_law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
         """Return the motor position [rad] without the drive's deflection and without the play."""
         half = 0.5 * p[1]
-        reading = x[MOTOR_POSITION, j]
+        reading = x[sig.MOTOR_POSITION, j]
         if half > 0.0:
-            x[LEAD, j] -= reading - x[POSITION, j]
-            lead = x[LEAD, j] if p[4] <= 0.0 else x[LEAD, j] + exp(-dt / p[4]) * (s[3] - x[LEAD, j])
+            x[sig.LEAD, j] -= reading - x[sig.POSITION, j]
+            lead = x[sig.LEAD, j] if p[4] <= 0.0 else x[sig.LEAD, j] + exp(-dt / p[4]) * (s[3] - x[sig.LEAD, j])
             s[3] = min(max(lead, -half), half)
-            x[GAP, j] = 1.0
+            x[sig.GAP, j] = 1.0
             if abs(lead) < half:
-                x[GAP, j] = 2.0
+                x[sig.GAP, j] = 2.0
                 if p[4] <= 0.0:
-                    x[DAMPING, j] = 0.0
+                    x[sig.DAMPING, j] = 0.0
             reading += s[3]
         if p[2] > 0.0:
-            gain, half = x[LOOP_GAIN, j], 0.5 * p[2]
-            loose = x[LOOSE_TORQUE, j] - gain * (reading - x[POSITION, j])
+            gain, half = x[sig.LOOP_GAIN, j], 0.5 * p[2]
+            loose = x[sig.LOOSE_TORQUE, j] - gain * (reading - x[sig.POSITION, j])
             side = tanh(_torque_behind_play(loose, gain * half, p[3]) / p[3])
             shown = 1.0 / (1.0 + gain * half * (1.0 - side * side) / p[3])
-            x[LEAD, j] = loose / gain + s[3]
-            x[DAMPING, j] *= shown
-            x[GAP, j] = 1.0 if shown > SHOWN else 2.0
+            x[sig.LEAD, j] = loose / gain + s[3]
+            x[sig.DAMPING, j] *= shown
+            x[sig.GAP, j] = 1.0 if shown > SHOWN else 2.0
             reading += half * side
         return reading
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        reading = x[MOTOR_POSITION, j]
+        reading = x[sig.MOTOR_POSITION, j]
         if p[0] > 0.0:
             half = 0.5 * p[0]
             if s[1] == 0.0:
@@ -327,5 +314,5 @@ class Backlash(Effect):
             s[2] = reading
             reading += s[0]
         if p[2] > 0.0:
-            reading += 0.5 * p[2] * tanh(x[TORQUE, j] / p[3])
+            reading += 0.5 * p[2] * tanh(x[sig.TORQUE, j] / p[3])
         return reading + s[3]

@@ -11,7 +11,6 @@ from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.fitting.problem import RUN_AWAY, STEP, Problem
@@ -22,14 +21,13 @@ from tactile_cube.measurement.comparing.comparison import Comparison, describe_c
 from tactile_cube.measurement.comparing.error import ErrorSummary, summarise_errors
 from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, sensor_noise
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.recordings.trial import Trial
+from tactile_cube.measurement.recordings.trial import Array, Trial
 from tactile_cube.measurement.replay.hand_replay import ContactModel, HandReplay, contact_of
 from tactile_cube.measurement.replay.model import Model, Term, nominal_model, require_same_joints
 from tactile_cube.measurement.replay.simulator import Simulated
 from tactile_cube.measurement.split import held_out_split
 from tactile_cube.simulation.contact_effects import ContactEffect, contact_catalogue
 
-Array = NDArray[np.float64]
 OBJECT = "object"  # where contact effects act, in the place of a joint
 OFFSET = 0.02  # [rad] standard deviation of a joint offset; the paper's initialisations differ by degrees
 PLACING = 1e-3  # [m] with which somebody puts the box in its place

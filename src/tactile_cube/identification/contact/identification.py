@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
 from tactile_cube.drivetrain.effects.effect import FINGER
@@ -38,7 +37,6 @@ from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model
 from tactile_cube.simulation.contact_effects import ContactEffect, contact_catalogue, is_contact_effect
 
-Array = NDArray[np.float64]
 Say = Callable[[str], None]
 LOOKED = 1  # trials of each kind on which every law gets its first step
 STEPS, LAST_STEPS = 3, 2  # of Gauss-Newton, of a set in a search and of the last fit

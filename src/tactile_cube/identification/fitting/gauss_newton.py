@@ -4,14 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_cube.drivetrain.effects.effect import Array
 from tactile_cube.identification.fitting.problem import STEP, Problem
 from tactile_cube.identification.fitting.unknowns import Unknown, put_all, read_all
 from tactile_cube.measurement.comparing.error import CORRELATED
 from tactile_cube.measurement.replay.model import Model
 
-Array = NDArray[np.float64]
 DAMPING = 1e-4  # of a first step, in units of the information
 POOR = 1.0  # damping, in units of the information, from which on a fit that stops takes finer derivatives
 CONVERGED = 2e-3  # relative gain below which a fit ends that only has to be compared with others
@@ -57,7 +56,7 @@ def fit(
         problem: the windows to fit.
         model: where to start.
         unknowns: what to fit; with `frozen`, beside its unknowns; none beside them is the chord method.
-        iterations: most steps that are taken.
+        iterations: most steps that are taken; 0 linearises the problem at the model.
         frozen: a fit whose columns are kept as they are, which spares simulating them; they change little.
         converged: relative gain of a step, made or promised, below which the fit ends.
     """
@@ -121,13 +120,6 @@ def noise_inflation(problem: Problem, cost: float) -> float:
     """
     excess = cost / max(float(np.count_nonzero(problem.weight)), 1.0) - 1.0
     return 1.0 + CORRELATED * max(excess, 0.0)
-
-
-def renewed(problem: Problem, fitted: Fit, prediction: Array, columns: Array) -> Fit:
-    """Return a fit with residual, columns and information of a problem whose starts were linearised again."""
-    residual, information = problem.residual(prediction), _information(problem, columns)
-    cost = float(problem.cost(residual).sum())
-    return Fit(fitted.model, fitted.unknowns, cost, fitted.prior_penalty, residual, columns, information)
 
 
 def prior_penalty(model: Model, unknowns: Sequence[Unknown]) -> float:

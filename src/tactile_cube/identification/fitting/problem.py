@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.drivetrain.effects.effect import Effect
+from tactile_cube.drivetrain.effects.effect import Array, Effect
 from tactile_cube.drivetrain.effects.friction import PreslidingFriction
 from tactile_cube.errors import InputError
 from tactile_cube.identification.fitting.unknowns import Unknown
@@ -19,7 +19,6 @@ from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.replay.simulator import Path, Simulator
 from tactile_cube.measurement.replay.windows import LONGEST_STEP, START_SPEED, Windows, cut
 
-Array = NDArray[np.float64]
 POSITION_STEP, SPEED_STEP = 5e-4, 0.02  # [rad], [rad/s] of a finger: finite differences of a segment's start
 
 

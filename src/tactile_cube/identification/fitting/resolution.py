@@ -4,9 +4,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tactile_cube.drivetrain.effects.effect import Effect
+from tactile_cube.drivetrain.effects.effect import Array, Effect
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit, precision
 from tactile_cube.identification.fitting.problem import Problem, Shooting
@@ -17,7 +16,6 @@ from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model, nominal_model
 from tactile_cube.measurement.replay.windows import Windows, steps_per_row
 
-Array = NDArray[np.float64]
 FINER = 8  # factor by which steps are refined to see the error of the model's own: 0.25 ms beside 2 ms
 ENOUGH = 12  # windows in which it is measured, spread over the recording: up to 53 s of a finger
 
@@ -73,7 +71,6 @@ def resolved(
     effects: Sequence[type[Effect]],
     say: Callable[[str], None],
     known: ModelFile | None = None,
-    beside: float = 1.0,
 ) -> Recording:
     """Return the recording with the longest simulation steps whose error is hidden by the noise.
 
@@ -86,13 +83,12 @@ def resolved(
         effects: classes to compile in; a search for them reuses their kernel.
         say: receives a line if the steps become shorter or longer.
         known: the model to simulate; None: the values that the recording's owner states.
-        beside: error of the model, relative to which the steps' error is measured [sensor noise].
     """
     noise = noise_with_links(recording)
 
     def error(one: Recording, times: int) -> float:
         start = nominal_model(one, known)
-        return step_error(one, Shooting(one, every_effect(effects, start)), start, noise, times) / max(beside, 1.0)
+        return step_error(one, Shooting(one, every_effect(effects, start)), start, noise, times)
 
     unstated = recording.description.controller.rate_hz is None
     rate = (_shorter if unstated else _longer)(recording, joint_scales(recording)[0].time, error)
@@ -121,16 +117,6 @@ def _longer(recording: Recording, time: float, error: StepError) -> float | None
         else:
             steps *= 2
     return None
-
-
-def stated_error(recording: Recording, effects: Sequence[type[Effect]], known: ModelFile | None = None) -> float:
-    """Return the RMS error [sensor noise] of the initial model on windows spread over the recording."""
-    start = nominal_model(recording, known)
-    shooting = Shooting(recording, every_effect(effects, start))
-    problem = Problem(shooting, spread(shooting.cut(recording, noise_with_links(recording))))
-    problem.linearise_starts(start)
-    residual = problem.residual(problem.predictions([start])[0])
-    return float(np.sqrt(problem.cost(residual).sum() / np.count_nonzero(problem.weight)))
 
 
 def step_error(recording: Recording, shooting: Shooting, model: Model, noise: Array, times: int) -> float:

@@ -6,14 +6,12 @@ from dataclasses import dataclass, replace
 from typing import Literal, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tactile_cube.drivetrain.effects.effect import Effect, Scales
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Scales
 from tactile_cube.measurement.comparing.error import LARGEST_OFFSET
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model
 
-Array = NDArray[np.float64]
 Key = TypeVar("Key", str, int)
 
 
@@ -127,38 +125,26 @@ def base_unknowns(
         for j in joints
         if 0.0 < nominal[key][j] < np.inf
     ]
+    softness = [sizes[joint].of("rad/s") / sizes[joint].of("N m") for joint in recording.joints]
     creeps = [
-        _creep(j, sizes[joint].of("rad/s") / sizes[joint].of("N m"))
-        for j, joint in enumerate(recording.joints)
+        Unknown("constant", "friction_creep", j, 0.0, one * LARGEST_CREEP, one * CREEP, spread=one * CREEP_SPREAD)
+        for j, one in enumerate(softness)
         if nominal["static_friction"][j] > 0.0
     ]
-    delays = [_reading_delay(j, recording.step) for j in joints]
+    row, spread = recording.step, READING_SPREAD * recording.step  # never exact, and what is a row late is a delay
+    delays = [Unknown("constant", "reading_delay", j, -row, row, 0.1 * row, spread=spread) for j in joints]
     return (*constants, *creeps, *delays, *offset_unknowns(recording, sizes))
 
 
 def offset_unknowns(recording: Recording, sizes: Mapping[str, Scales]) -> tuple[Unknown, ...]:
     """Return the joint offsets of each initialisation of a recording as unknowns."""
     initialisations = sorted({trial.initialisation for trial in recording.trials})
+    angles = [sizes[joint].of("rad") for joint in recording.joints]
     return tuple(
-        _offset(j, initialisation, sizes[joint].of("rad"))
+        Unknown("offset", "offset", j, -most, most, size * OFFSET, initialisation, spread=size * OFFSET_SPREAD)
         for initialisation in initialisations
-        for j, joint in enumerate(recording.joints)
+        for j, (size, most) in enumerate((size, size * LARGEST_OFFSET) for size in angles)
     )
-
-
-def _offset(joint: int, initialisation: int, size: float) -> Unknown:
-    most, scale, spread = size * LARGEST_OFFSET, size * OFFSET, size * OFFSET_SPREAD
-    return Unknown("offset", "offset", joint, -most, most, scale, initialisation, spread=spread)
-
-
-def _creep(joint: int, size: float) -> Unknown:
-    most, scale, spread = size * LARGEST_CREEP, size * CREEP, size * CREEP_SPREAD
-    return Unknown("constant", "friction_creep", joint, 0.0, most, scale, spread=spread)
-
-
-def _reading_delay(joint: int, row: float) -> Unknown:
-    """Return the reading time within a row as an unknown: it is never exact, and what is a row late is a delay."""
-    return Unknown("constant", "reading_delay", joint, -row, row, 0.1 * row, spread=READING_SPREAD * row)
 
 
 def _around_nominal(key: str, joint: int, nominal: float, low: float, high: float, unknown: bool) -> Unknown:

@@ -1,23 +1,19 @@
 """Candidates: every effect in every form, and models with effects added, removed or refined."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tactile_cube.drivetrain.effects.effect import FINGER, Effect, Parameter, Scales
+from tactile_cube.drivetrain.effects.effect import FINGER, Array, Effect, Parameter, Scales
 from tactile_cube.identification.fitting.gauss_newton import Fit, noise_inflation, precision
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.unknowns import Unknown
 from tactile_cube.measurement.replay.model import Model, Term
 
 EffectClass = type[Effect]
-Sizes = Mapping[str, Scales]
-"""Joint -> its sizes; a joint that is not there counts as a finger's."""
+Sizes = Mapping[str, Scales]  # joint -> its sizes; a joint that is not there counts as a finger's
 UNKNOWN = (0.0, math.inf)  # centre and standard deviation of a number of which nothing is known
 MOST_SHOWN = 4  # fitted parameters that a label lists
 NO_SIZE = 1e6  # a limit so far off, in the units of a finger, is none
@@ -104,11 +100,6 @@ def model_unknowns(model: Model, sizes: Sizes | None = None) -> tuple[Unknown, .
     return tuple(u for place, term in enumerate(model.terms) for u in term_unknowns(term, place, sizes))
 
 
-def forms(effect: EffectClass) -> list[dict[str, float]]:
-    """Return the forms of an effect at a finger's joint."""
-    return effect.forms_at(FINGER)
-
-
 def candidates(sizes: Sizes, effects: Sequence[EffectClass]) -> list[Candidate]:
     """Return every effect in every form at each joint where it can act, except forms started from the residual."""
     return [
@@ -152,7 +143,6 @@ def without_effect(model: Model, effects: Sequence[Candidate], place: int) -> Mo
     return replace(model, terms=(*model.terms[:first], *model.terms[first + len(effects[place].joints) :]))
 
 
-Array = NDArray[np.float64]
 BATCH = 24  # candidates simulated at once, which bounds the memory
 
 

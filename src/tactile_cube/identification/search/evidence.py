@@ -1,7 +1,5 @@
 """Comparison of fitted models on held-out trials."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -37,7 +35,6 @@ class Judgement:
         residual: (G, R) weighted.
         joint_errors: (n,) RMS error of each joint in units of the sensor noise.
         trial: (G,) to which each belongs; segments of one trial follow each other in time.
-        joint_costs: (G, n) part of the squared error that is each joint's; empty where it is not known.
     """
 
     model: Model
@@ -46,7 +43,6 @@ class Judgement:
     residual: Array = field(repr=False)
     joint_errors: Array
     trial: NDArray[np.int64]
-    joint_costs: Array = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
 
     @property
     def error(self) -> float:
@@ -60,10 +56,7 @@ def judge(problem: Problem, held_out: Recording, model: Model) -> Judgement:
     samples = np.count_nonzero(problem.weight, axis=1)
     costs = charged(problem.cost(fitted.residual), samples, problem.chosen_numbers(fitted.model))
     joints = joint_errors(problem, fitted.residual)
-    squares = np.maximum(_joint_squares(problem, fitted.residual)[0], 0.0)
-    shares = squares / np.maximum(squares.sum(axis=1, keepdims=True), np.finfo(float).tiny)
-    trial = problem.segment_trial
-    return Judgement(fitted.model, costs, samples, fitted.residual, joints, trial, costs[:, None] * shares)
+    return Judgement(fitted.model, costs, samples, fitted.residual, joints, problem.segment_trial)
 
 
 def charged(costs: Array, samples: NDArray[np.int64], numbers: NDArray[np.int64]) -> Array:
@@ -78,25 +71,20 @@ def charged(costs: Array, samples: NDArray[np.int64], numbers: NDArray[np.int64]
     return np.asarray(costs + excess * ((independent / (independent - numbers)) ** 2 - 1.0))
 
 
-def joint_squares(problem: Problem, residual: Array) -> Array:
-    """Return squared residuals (n,) of each joint in units of the noise, initial states projected out."""
-    return np.asarray(np.maximum(_joint_squares(problem, residual)[0].sum(axis=0), 0.0))
-
-
 def joint_errors(problem: Problem, residual: Array) -> Array:
     """Return RMS residuals (n,) of each joint in units of the noise, initial states projected out."""
-    squares, present = _joint_squares(problem, residual)
+    squares, present = joint_squares(problem, residual)
     return np.asarray(np.sqrt(np.maximum(squares.sum(axis=0), 0.0) / np.maximum(present.sum(axis=0), 1)))
 
 
 def segment_errors(problem: Problem, residual: Array) -> Array:
     """Return the same for each segment (G, n); nan where nothing was measured."""
-    squares, present = _joint_squares(problem, residual)
+    squares, present = joint_squares(problem, residual)
     return np.asarray(np.sqrt(np.maximum(squares, 0.0) / np.where(present > 0, present, np.nan)))
 
 
-def _joint_squares(problem: Problem, residual: Array) -> tuple[Array, NDArray[np.int64]]:
-    """Return squared residuals (G, n), initial states projected out, and the number of samples."""
+def joint_squares(problem: Problem, residual: Array) -> tuple[Array, NDArray[np.int64]]:
+    """Return squared residuals (G, n) in units of the noise, initial states projected out, and the samples in each."""
     joint_of = problem.windows.joint_of
     shape = (len(residual), -1, len(joint_of))
     present = np.count_nonzero(problem.weight.reshape(shape), axis=1)
@@ -172,7 +160,8 @@ def in_blocks(difference: Array, judged: Judgement) -> Array:
     length = correlation_length(difference, trial)
     if length == 1:
         return difference
-    sums = [np.add.reduceat(part, np.arange(0, len(part), length)) for part in _by_trial(difference, trial)]
+    by_trial = np.split(difference, np.flatnonzero(np.diff(trial)) + 1)
+    sums = [np.add.reduceat(part, np.arange(0, len(part), length)) for part in by_trial]
     return np.concatenate(sums)
 
 
@@ -194,10 +183,6 @@ def correlation_length(difference: Array, trial: NDArray[np.int64]) -> int:
             break
         length += 2.0 * correlation
     return int(np.ceil(length))
-
-
-def _by_trial(values: Array, trial: NDArray[np.int64]) -> list[Array]:
-    return np.split(values, np.flatnonzero(np.diff(trial)) + 1)
 
 
 ITERATIONS = 3  # that the joint offsets of unseen initialisations take

@@ -13,19 +13,42 @@ from tactile_cube.identification.search.evidence import Judgement, gain, lacking
 
 
 @dataclass(frozen=True)
-class Explanation:
-    """Refitted model with a set of effects.
+class Proposal:
+    """Set of effects fitted to the training trials; held-out trials are not used.
 
     Attributes:
-        effects: candidates in the order in which they were added.
-        fit: on the fitted trials.
+        effects: in the order in which they came.
+        fit: of everything together.
+    """
+
+    effects: tuple[Candidate, ...]
+    fit: Fit = field(repr=False)
+
+    @property
+    def label(self) -> str:
+        """Readable."""
+        return " & ".join(c.label for c in self.effects) or "the refitted model"
+
+    def price(self, criteria: Criteria) -> float:
+        """Return the squared error with a penalty for each parameter."""
+        return priced(self.fit.cost, self.effects, criteria)
+
+
+def priced(cost: float, effects: Sequence[Candidate], criteria: Criteria) -> float:
+    """Return a squared error with a penalty of `least_gain` for each parameter."""
+    return float(cost / (1.0 - criteria.least_gain) ** sum(one.size for one in effects))
+
+
+@dataclass(frozen=True)
+class Explanation(Proposal):
+    """Proposal that was scored on the held-out trials.
+
+    Attributes:
         judgement: on the held-out trials.
         p_value: against the base model, corrected for the number of laws screened.
         gain: share of the held-out squared error that it explains.
     """
 
-    effects: tuple[Candidate, ...]
-    fit: Fit = field(repr=False)
     judgement: Judgement = field(repr=False)
     p_value: float
     gain: float
@@ -64,7 +87,7 @@ def simplest(found: Sequence[Explanation], criteria: Criteria = STANDARD) -> Exp
     """Return the explanation with the fewest effects, then parameters, among those as good as the best."""
     best = min(found, key=lambda e: e.judgement.costs.sum())
     equal = [e for e in found if not worse(e.judgement, best.judgement, criteria)]
-    return min(equal, key=lambda e: (len(named(e)), e.size, e.judgement.costs.sum()))
+    return min(equal, key=lambda e: (len(named_by(e.effects)), e.size, e.judgement.costs.sum()))
 
 
 def sound(
@@ -77,9 +100,9 @@ def sound(
     """
 
     def refuted(one: Explanation, other: Explanation) -> bool:
-        if named(one) < named(other):
+        if named_by(one.effects) < named_by(other.effects):
             return lacking(one.judgement, other.judgement, criteria, looked_at) and not in_detail(other, one)
-        if named(other) < named(one):
+        if named_by(other.effects) < named_by(one.effects):
             return gain(other.judgement, one.judgement) < criteria.least_gain or in_detail(one, other)
         return False
 
@@ -99,13 +122,8 @@ def contains(richer: Explanation, simple: Explanation) -> bool:
     return special.effect.name in last.effect.contains and special.joints == last.joints
 
 
-def named(explanation: Explanation) -> frozenset[tuple[str, str]]:
-    """Return the (effect, joint) pairs of an explanation, whatever their form."""
-    return named_by(explanation.effects)
-
-
 def named_by(effects: Sequence[Candidate]) -> frozenset[tuple[str, str]]:
-    """Return the (effect, joint) pairs of candidates."""
+    """Return the (effect, joint) pairs of candidates, whatever their form."""
     return frozenset((c.effect.name, joint) for c in effects for joint in c.joints)
 
 
@@ -131,34 +149,7 @@ def unproven(explanation: Explanation, criteria: Criteria = STANDARD) -> bool:
     return explanation.gain > criteria.detail and not proven(explanation, criteria)
 
 
-@dataclass(frozen=True)
-class Proposal:
-    """Set of effects fitted to the training trials; held-out trials are not used.
-
-    Attributes:
-        effects: in the order in which they came.
-        fit: of everything together.
-    """
-
-    effects: tuple[Candidate, ...]
-    fit: Fit = field(repr=False)
-
-    @property
-    def label(self) -> str:
-        """Readable."""
-        return " & ".join(c.label for c in self.effects) or "the refitted model"
-
-    def price(self, criteria: Criteria) -> float:
-        """Return the squared error with a penalty for each parameter."""
-        return priced(self.fit.cost, self.effects, criteria)
-
-
-def priced(cost: float, effects: Sequence[Candidate], criteria: Criteria) -> float:
-    """Return a squared error with a penalty of `least_gain` for each parameter."""
-    return float(cost / (1.0 - criteria.least_gain) ** sum(one.size for one in effects))
-
-
-def at_bound(one: Explanation | Proposal) -> bool:
+def at_bound(one: Proposal) -> bool:
     """Return whether a parameter of its effects is at a bound that is not its neutral value.
 
     The law then imitates another one, as a wave longer than the range of motion imitates any curve.

@@ -1,15 +1,12 @@
 """Forward selection of effects: single laws, growing sets, and one comparison on held-out trials."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import t as student_t
 
-from tactile_cube.drivetrain.effects.effect import Effect
+from tactile_cube.drivetrain.effects.effect import Array, Effect
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.fitting.resolution import NORMAL_95, standard_errors
@@ -19,7 +16,6 @@ from tactile_cube.identification.search.explanation import (
     Explanation,
     Proposal,
     nameable,
-    named,
     named_by,
     proven,
     simplest,
@@ -88,7 +84,7 @@ class Findings:
                 for one in self.judged
                 if not proven(one, criteria)
                 and one.judgement.costs.sum() < best.judgement.costs.sum()
-                and len(named(one)) <= len(named(best))
+                and len(named_by(one.effects)) <= len(named_by(best.effects))
             ]
         return sorted(found, key=lambda one: one.judgement.costs.sum())
 
@@ -231,13 +227,13 @@ def twins(search: Search, chosen: Explanation, first: Looks, judged: Sequence[Ex
     becomes them, as is the set without the effect. A law with many more parameters is not tried.
     """
     known = {named_by(one.effects) for one in judged}
-    itself, found = Proposal(chosen.effects, chosen.fit), list[Proposal]()
+    found: list[Proposal] = []
     for places in together(chosen.effects):
         replaced, looks = [chosen.effects[place] for place in places], first
         simpler = set.intersection(*(simpler_laws(search, chosen, place) for place in places))
         if len(places) < len(chosen.effects):
             joints = [joint for effect in replaced for joint in effect.joints]
-            looks = look(search, without(search, itself, *places), joints)
+            looks = look(search, without(search, chosen, *places), joints)
             if (left := named_by(looks.parent.effects)) not in known:
                 known.add(left)
                 found.append(looks.parent)
@@ -255,9 +251,9 @@ def twins(search: Search, chosen: Explanation, first: Looks, judged: Sequence[Ex
             if len(found) >= JUDGED or names in known or search.spent:
                 continue
             known.add(names)
-            if not near(looks, left_by(looks, one), [itself]):
+            if not near(looks, left_by(looks, one), [chosen]):
                 one = tuple(further(looks, law, fitted) for law, fitted in one)
-            if one[0][0].effect.name in simpler or near(looks, left_by(looks, one), [itself]):
+            if one[0][0].effect.name in simpler or near(looks, left_by(looks, one), [chosen]):
                 found.append(refitted(search, looks, one))
     return [one for one in found if one.fit.cost <= CLOSE * chosen.fit.cost]
 
@@ -292,7 +288,6 @@ def reached(effect: type[Effect], fitted: Fit, half_width: Array, term: int) -> 
     }
 
 
-Array = NDArray[np.float64]
 LEAST = 0.012  # [rad] of a finger: smaller joint offsets are ordinary
 UNLIKELY = 0.001  # p-value over all joints below which offsets are not explained by initialisation
 STRIKING, DOUBTFUL = 0.03, 0.1  # [rad] of a finger and p-value: offsets between them are mentioned

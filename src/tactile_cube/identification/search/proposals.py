@@ -1,17 +1,14 @@
 """Candidate sets of effects, ranked on the fitted trials: single laws, pairs, and one law at several joints."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tactile_cube.drivetrain.effects.effect import Stage
+from tactile_cube.drivetrain.effects.effect import Array, Stage
 from tactile_cube.identification.criteria import Criteria
-from tactile_cube.identification.fitting.gauss_newton import Fit, fit, noise_inflation, precision, renewed
+from tactile_cube.identification.fitting.gauss_newton import Fit, fit, noise_inflation, precision
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.search.candidates import (
     Candidate,
@@ -28,19 +25,17 @@ from tactile_cube.identification.search.residual_starts import residual_candidat
 from tactile_cube.identification.search.search import Search, failing
 from tactile_cube.measurement.replay.windows import Windows
 
-Array = NDArray[np.float64]
 LOOKED_AT = 4  # part of the segments to judge by, on which every law gets its own steps
 PROMISING = 0.01  # of its joint's squared error: least first-order gain of a law that is fitted
 STEPS = 2  # of Gauss-Newton for each promising law
-MORE_STEPS = 6  # for a law that may be an alternative to a chosen one
+MORE_STEPS = 6  # for a law that is asked for, or that may be an alternative to a chosen one
 LARGER = 2.0  # most that a law is scaled up within a set; its linearisation holds near its own fit
 SINGLES = 4  # laws that are refitted exactly
 LEAVE_LEAST, CHEAPEST = 3, 2  # pairs that are refitted: with the smallest predicted error, with the lowest price
 CLOSE = 2.5  # ratio of squared errors up to which a full refit may make another law as good as the best
 
 
-Tried = tuple[tuple[Candidate, Fit], ...]
-"""Laws that are added together, each after its own steps."""
+Tried = tuple[tuple[Candidate, Fit], ...]  # laws that are added together, each after its own steps
 
 
 @dataclass(frozen=True)
@@ -78,7 +73,7 @@ def look(search: Search, parent: Proposal, at: Sequence[str]) -> Looks:
     """Screen all laws at some joints beside a fitted set, and fit the promising ones."""
     problem = Problem(search.shooting, failing_windows(search, parent.fit))
     problem.linearise_starts(parent.fit.model)
-    frozen = renewed(problem, parent.fit, *problem.columns(parent.fit.model, parent.fit.unknowns))
+    frozen = fit(problem, parent.fit.model, parent.fit.unknowns, iterations=0)
     there = named_by(parent.effects)
     possible = [
         one
@@ -86,7 +81,8 @@ def look(search: Search, parent: Proposal, at: Sequence[str]) -> Looks:
         if there.isdisjoint(named_by([one])) and (one.joints[0] in at or one.effect.stage is Stage.MECHANISM)
     ]
     scores = screen(problem, frozen, possible)
-    squares = dict(zip(search.fitted.joints, joint_squares(problem, frozen.residual), strict=True))
+    of_joints = np.maximum(joint_squares(problem, frozen.residual)[0].sum(axis=0), 0.0)
+    squares = dict(zip(search.fitted.joints, of_joints, strict=True))
     promising = [one for one in scores if one.gain > PROMISING * min(squares[joint] for joint in one.candidate.joints)]
     tried = sorted((stepped(problem, frozen, one) for one in best_starts(promising)), key=lambda pair: pair[1].cost)
     alike = fit(problem, frozen.model, (), STEPS, frozen)
@@ -107,10 +103,10 @@ def wanted(search: Search, problem: Problem, frozen: Fit) -> list[Candidate]:
     return search.new([*search.candidates, *residual_candidates(problem, search.fitted, frozen, search.effects)])
 
 
-def stepped(problem: Problem, frozen: Fit, candidate: Candidate) -> tuple[Candidate, Fit]:
+def stepped(problem: Problem, frozen: Fit, candidate: Candidate, iterations: int = STEPS) -> tuple[Candidate, Fit]:
     """Fit a law alone beside a frozen fit."""
     model, unknowns = candidate.added_to(frozen.model)
-    return candidate, fit(problem, model, unknowns, STEPS, frozen)
+    return candidate, fit(problem, model, unknowns, iterations, frozen)
 
 
 def best_starts(scores: Sequence[Score]) -> list[Candidate]:

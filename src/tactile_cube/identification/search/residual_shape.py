@@ -1,7 +1,5 @@
 """Missing torque of a model: its average over bins of each signal, and the share that any law could explain."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -73,7 +71,8 @@ def missing_torques(
     position, velocity, acceleration = _derivatives(measured, step, problem.shooting.time)
     constants = model.constants
     soft = 1.0 + constants["kp"] / constants["stiffness"]
-    inertia = _inertia(problem, model, measured)
+    mass = problem.shooting.tree.actuated_mass_matrix(measured.reshape(-1, n).mean(axis=0))
+    inertia = np.diag(mass) + constants["reflected_inertia"]  # (n,) of the joints, at the mean configuration [kg m^2]
     r, dr, ddr = _derivatives(error, step, problem.shooting.time if time is None else time / PARABOLA)
     torque = inertia * ddr + constants["kd"] / soft * dr + constants["kp"] / soft * r
     drive = _drive(problem, model, position, velocity)
@@ -198,10 +197,3 @@ def _derivatives(x: Array, step: float, time: float) -> tuple[Array, Array, Arra
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1, axis=1)
     value, slope, curvature = (windows @ row for row in weights)
     return value, slope, curvature
-
-
-def _inertia(problem: Problem, model: Model, measured: Array) -> Array:
-    """Return the diagonal (n,) of the joint-space inertia at the mean configuration [kg m^2]."""
-    posture = measured.reshape(-1, measured.shape[2]).mean(axis=0)
-    mass = problem.shooting.tree.actuated_mass_matrix(posture)
-    return np.asarray(np.diag(mass) + model.constants["reflected_inertia"])

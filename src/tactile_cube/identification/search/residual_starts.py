@@ -1,22 +1,18 @@
 """Candidates whose starts are read from what a fit leaves: harmonics, profiles over the position."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tactile_cube.drivetrain.effects.effect import Effect, Scales, Stage
+from tactile_cube.drivetrain.effects.effect import FINGER, Array, Effect, Scales, Stage
 from tactile_cube.drivetrain.signals import ANGLE, JOINT_TORQUE, ROWS
 from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.fitting.problem import Problem
-from tactile_cube.identification.search.candidates import Candidate, Sizes, forms
+from tactile_cube.identification.search.candidates import Candidate, Sizes
 from tactile_cube.identification.search.residual_shape import Missing, missing_torques
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model
 
-Array = NDArray[np.float64]
 HARMONIC = "harmonic"  # parameter [1/rad] by which an effect says that it repeats with the position
 LOWEST, HIGHEST = 1.25, 160.0  # [1/rad] of a finger: waves of 5 rad to 39 mrad
 RESOLUTION = 0.8  # grid step times the range of motion: finer than half a peak
@@ -33,7 +29,7 @@ def periodic_candidates(
     sizes: Sizes,
 ) -> list[Candidate]:
     """Return the candidates at the strongest harmonics of what is missing, for every effect that has one."""
-    periodic = [effect for effect in effects if any(HARMONIC in form for form in forms(effect))]
+    periodic = [effect for effect in effects if any(HARMONIC in form for form in effect.forms_at(FINGER))]
     found = []
     for missing in missing_torques:
         damping = float(model.constants["kd"][recording.joints.index(missing.joint)])

@@ -1,7 +1,5 @@
 """Search problem: a recording split into fitted and held-out trials, and the candidate laws."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Sequence
@@ -10,10 +8,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.drivetrain.effects.effect import Effect
+from tactile_cube.drivetrain.effects.effect import Array, Effect
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.criteria import STANDARD, Criteria
-from tactile_cube.identification.fitting.gauss_newton import Fit, fit, renewed
+from tactile_cube.identification.fitting.gauss_newton import Fit, fit
 from tactile_cube.identification.fitting.problem import Problem, Shooting
 from tactile_cube.identification.fitting.unknowns import Unknown, base_unknowns, every_effect
 from tactile_cube.identification.search.candidates import Candidate, candidates, model_unknowns
@@ -23,7 +21,6 @@ from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model, nominal_model
 from tactile_cube.measurement.replay.windows import Windows
 
-Array = NDArray[np.float64]
 LONG = 8  # most iterations of a refit; one that converges ends before
 SEGMENTS = 132  # enough data to judge by, 52.8 s of a finger; the final fit takes all
 RENEWED, HELPS = 3, 0.98  # times that starts are taken anew, and part of the squared error that has to be left for that
@@ -147,15 +144,7 @@ class Search:
     def frozen(self, fitted: Fit) -> Fit:
         """Return a fit with residual and columns updated on this problem."""
         self.problem.linearise_starts(fitted.model)
-        prediction, columns = self.problem.columns(fitted.model, fitted.unknowns)
-        return renewed(self.problem, fitted, prediction, columns)
-
-    def refit(
-        self, frozen: Fit, candidate: Candidate, iterations: int = 6, model: Model | None = None
-    ) -> tuple[Candidate, Fit]:
-        """Fit a candidate beside the frozen columns of its parent, started from `model` or the parent."""
-        model, unknowns = candidate.added_to(model or frozen.model)
-        return candidate, fit(self.problem, model, unknowns, iterations, frozen=frozen)
+        return fit(self.problem, fitted.model, fitted.unknowns, iterations=0)
 
     def refitted(self, model: Model) -> Fit:
         """Refit a model completely, linearising initial states anew as long as that helps."""
