@@ -114,6 +114,20 @@ def test_an_effect_that_explains_half_of_little_is_not_named() -> None:
     assert decide(findings(1.9, explanation("backlash", 1.1, 1.9))).kind == "missing_effect"
 
 
+@pytest.mark.parametrize(("beside", "kind"), [(1.0, "partly_explained"), (1.4, "missing_effect")])
+def test_a_set_beside_which_another_law_explains_most_of_the_rest_is_not_all(beside: float, kind: str) -> None:
+    """Nearly everything is explained, and what is left shows in too few segments to prove the second law."""
+    one = explanation("rate_limit", 1.8, 300.0)
+    rest = np.zeros(60)
+    rest[:4] = (one.judgement.costs.sum() - 6000.0 * beside**2) / 4
+    less = replace(one, judgement=replace(one.judgement, costs=np.full(60, 100.0 * beside**2) + rest))
+    both = (*one.effects, *explanation("actuator_lag", beside).effects)
+    more = replace(explanation("rate_limit", beside, 300.0), effects=both)
+    more = replace(more, judgement=replace(more.judgement, costs=np.full(60, 100.0 * beside**2)))
+    verdict = decide(findings(300.0, less, more))
+    assert (verdict.kind, verdict.chosen) == (kind, less)
+
+
 def test_most_of_what_is_missing_is_named_and_said_not_to_be_all() -> None:
     lever, scale = explanation("payload", 5.0), explanation("torque_gain", 5.0)
     verdict = decide(findings(20.0, explanation("backlash", 5.0), explanation("elasticity", 9.0)))

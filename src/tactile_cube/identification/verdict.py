@@ -59,9 +59,20 @@ def decide(findings: Findings, criteria: Criteria = STANDARD) -> Verdict:
     if not nameable(chosen, base, criteria):
         return Verdict("unknown_effect", closest(likely if plausible else found, findings, criteria))
     rivals = find_rivals(chosen, plausible or possible, criteria)
-    if not plausible or not complete(chosen, base, criteria):
+    if not plausible or not complete(chosen, base, criteria) or lacks_a_law(chosen, found, criteria):
         return Verdict("partly_explained", chosen, rivals)
     return Verdict("ambiguous" if rivals else "missing_effect", chosen, rivals)
+
+
+def lacks_a_law(chosen: Explanation, found: Sequence[Explanation], criteria: Criteria) -> bool:
+    """Return whether a joint's error stays above what is tolerated, while a larger set explains most of it.
+
+    It may do so without proof, in a few segments. A law that differs in form from the machine leaves an error too, but
+    no further law explains most of that.
+    """
+    larger = [one for one in found if named_by(chosen.effects) < named_by(one.effects)]
+    left = chosen.largest_error > criteria.tolerated
+    return left and any(one.explained(chosen) >= criteria.most for one in larger)
 
 
 def closest(found: Sequence[Explanation], findings: Findings, criteria: Criteria) -> Explanation:
