@@ -26,7 +26,7 @@ from tactile_cube.visualization.rerun_recording import (
     log_robot,
     recording_file,
 )
-from tactile_cube.visualization.scene import BELOW, SIDE, Part, Scene, object_parts
+from tactile_cube.visualization.scene import ABOVE, BELOW, SIDE, Part, Scene, object_parts
 from tactile_cube.whole_file import write_whole
 
 FINGER_COLOURS = ((214, 69, 65), (245, 171, 53), (38, 166, 91), (65, 131, 215), (150, 90, 200), (90, 190, 200))
@@ -243,7 +243,7 @@ def showcase(evaluation: Evaluation, variants: list[VariantResult], folder: Path
 
 
 def write_film(record: EpisodeRecord, path: Path, *, view: int = 256, hand: Hand = DLR_HAND2) -> None:
-    """Write an animated GIF: the hand from the side and from below, at most 3 MB, faster than real time beyond 40 s.
+    """Write an animated GIF: the hand from the side and into its palm, at most 3 MB, faster than real time beyond 40 s.
 
     Args:
         record: the episode.
@@ -264,14 +264,14 @@ def write_film(record: EpisodeRecord, path: Path, *, view: int = 256, hand: Hand
 
 
 def _frames(record: EpisodeRecord, samples: list[int], view: int, hand: Hand) -> list[Image.Image]:
-    contact = touching(record)
-    frames = []
+    contact, frames = touching(record), []
+    across = ABOVE if hand.palm_contact else BELOW
     with closing(Scene(record.cube_size, hand, record.object_shape)) as scene:
         for sample in samples:
             scene.pose(record.joint_position[sample], record.cube_position[sample], record.cube_quaternion[sample])
             frame = Image.new("RGB", (2 * view, view + CAPTION_HEIGHT), "white")
             frame.paste(scene.picture(SIDE, view, view), (0, CAPTION_HEIGHT))
-            frame.paste(scene.picture(BELOW, view, view), (view, CAPTION_HEIGHT))
+            frame.paste(scene.picture(across, view, view), (view, CAPTION_HEIGHT))
             angle = record.theta[sample] - record.theta[0]
             _caption(frame, float(record.time[sample]), float(angle), record.fingers, contact[sample].tolist())
             frames.append(frame)

@@ -101,6 +101,7 @@ class Camera:
 
 SIDE = Camera(yaw=35.0, pitch=-10.0, distance=0.33, height=0.03)
 BELOW = Camera(yaw=0.0, pitch=72.0, distance=0.30)
+ABOVE = Camera(yaw=0.0, pitch=-72.0, distance=0.36, height=-0.05)  # of a hand that lies palm up
 
 
 class Scene:
