@@ -30,7 +30,8 @@ def test_choice_composes_and_instantiates(choice: str) -> None:
     plain = OmegaConf.to_container(config, resolve=True)
     assert isinstance(plain, dict)
     environment = as_environment(instantiate(config.env))
-    assert environment.sizes == Sizes(120, 25, 12)
+    joints = 16 if "leap_in_palm" in choice else 12
+    assert environment.sizes == Sizes(10 * joints, 13 + joints, joints)
     weights = environment.reward_weights(Conditions(0.12, 1.0, 1.0))
     assert weights.shape == (len(environment.terms),)
     agent = instantiate(config.agent, _partial_=True)(environment.sizes)

@@ -106,9 +106,9 @@ def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_a_policy_of_files_elsewhere_wants_them_named_and_knows_its_urdf(elsewhere: Path) -> None:
     hand: Any = {"hand": "three_finger", "hand.urdf": "mine.urdf"}
     object_: Any = {"object": "mesh", "object.file": "object.obj"}
-    with pytest.raises(InputError, match=r"env\.hand\.urdf is 'mine\.urdf'.* name it yourself: hand="):
+    with pytest.raises(InputError, match=r"env\.hand\.urdf is 'mine\.urdf'.* choose it yourself: hand="):
         tactile_cube.export(elsewhere, "own.npz", values=object_)
-    with pytest.raises(InputError, match=r"env\.constants\.object\.file is .* name it yourself: object="):
+    with pytest.raises(InputError, match=r"env\.constants\.object\.file is .* choose it yourself: object="):
         tactile_cube.export(elsewhere, "own.npz", values=hand)
     contract = json.loads(tactile_cube.export(elsewhere, "own.npz", values=hand | object_).read_text())
     assert contract["hand"]["urdf"] == {

@@ -63,6 +63,11 @@ class Recording:
         control = self.description.controller.rate_hz or self.rate
         return max(1, math.ceil(self.step / longest - 1e-6), round(control / self.rate))
 
+    @property
+    def urdf(self) -> str:
+        """Text of the URDF."""
+        return self.rig.text
+
     def with_controller_rate(self, rate: float) -> Self:
         """Return the recording with a controller that computes its torque at `rate` [Hz]."""
         controller = self.description.controller.model_copy(update={"rate_hz": rate})
