@@ -30,7 +30,7 @@ def test_choice_composes_and_instantiates(choice: str) -> None:
     plain = OmegaConf.to_container(config, resolve=True)
     assert isinstance(plain, dict)
     environment = as_environment(instantiate(config.env))
-    joints = 16 if "leap_in_palm" in choice else 12
+    joints = instantiate(config.hand).joints
     assert environment.sizes == Sizes(10 * joints, 13 + joints, joints)
     weights = environment.reward_weights(Conditions(0.12, 1.0, 1.0))
     assert weights.shape == (len(environment.terms),)

@@ -10,6 +10,7 @@ from tactile_cube.errors import InputError
 from tactile_cube.evaluation.protocol import NumbPolicy, Protocol, Pull, Variant, numb_reading
 from tactile_cube.randomization import Randomization, Uniform
 from tactile_cube.transforms import EnvConfig
+from tests.own_hands import own_hand
 
 
 @pytest.mark.parametrize("wrong", [{"episodes": 0}, {"seconds": -1.0}, {"variants": ()}, {"film": -1}, {"worlds": "x"}])
@@ -19,9 +20,15 @@ def test_impossible_protocols_are_refused_by_key(wrong: dict[str, Any]) -> None:
 
 
 def test_the_catalogue_adds_one_variant_for_each_effect() -> None:
-    conditions = Protocol("x", catalogue=True).conditions
+    conditions = Protocol("x", catalogue=True).conditions()
     assert len(conditions) == 1 + len(catalogue())
     assert {name for variant in conditions for name in variant.effects} == set(catalogue())
+
+
+def test_each_finger_of_whichever_hand_can_be_numbed() -> None:
+    numb = Protocol("x", numb_fingers=True)
+    assert [one.numb for one in numb.conditions()[1:]] == [("ring",), ("middle",), ("fore",), ("thumb",)]
+    assert [one.name for one in numb.conditions(own_hand())[1:]] == ["left numb", "right numb", "thumb numb"]
 
 
 def config() -> EnvConfig:

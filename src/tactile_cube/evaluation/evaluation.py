@@ -89,7 +89,10 @@ class Evaluation:
 
     def run(self, report: Report) -> list[VariantResult]:
         """Run all episodes."""
-        results = [self._run_variant(variant, report) for variant in self.protocol.conditions]
+        conditions = self.protocol.conditions(self.hand)
+        for variant in conditions:
+            variant.apply(self._config)  # refuses before hours of episodes what the last one would refuse
+        results = [self._run_variant(variant, report) for variant in conditions]
         if self.protocol.replay:
             results += self._run_displaced(results[0].results, report)
         return results

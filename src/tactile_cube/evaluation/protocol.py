@@ -154,6 +154,7 @@ class Protocol:
         variants: conditions, each tried with the same seeds.
         nominal_values: where the nominal condition lies on the axes of the variants.
         catalogue: add a variant for each effect of the drivetrain's catalogue at its typical size.
+        numb_fingers: add a variant for each finger of the hand, whose senses are frozen.
         replay: standard deviations of the start's displacement [m]; at each, the targets of the policy's best
             episode are replayed in its world, and the policy is tried there.
         film: number of episodes, the best first, that are filmed and recorded for Rerun.
@@ -167,6 +168,7 @@ class Protocol:
     variants: Sequence[Variant] = field(default_factory=lambda: (Variant(),))
     nominal_values: Mapping[str, float] = field(default_factory=dict)
     catalogue: bool = False
+    numb_fingers: bool = False
     replay: Sequence[float] = ()
     film: int = 1
     trace: bool = True
@@ -184,8 +186,12 @@ class Protocol:
             if not sound:
                 raise InputError(f"protocol.{key} is {getattr(self, key)!r}; {wanted}")
 
-    @property
-    def conditions(self) -> tuple[Variant, ...]:
-        """All variants, those of the catalogue included."""
-        names = catalogue() if self.catalogue else ()
-        return (*self.variants, *(Variant(name=effect.replace("_", " "), effects=(effect,)) for effect in names))
+    def conditions(self, hand: Hand = DLR_HAND2) -> tuple[Variant, ...]:
+        """Return all variants, those of the hand's fingers and of the catalogue included."""
+        numb = [finger.name for finger in hand.fingers if self.numb_fingers]
+        effects = catalogue() if self.catalogue else ()
+        return (
+            *self.variants,
+            *(Variant(name=f"{finger} numb", numb=(finger,)) for finger in numb),
+            *(Variant(name=effect.replace("_", " "), effects=(effect,)) for effect in effects),
+        )
