@@ -26,6 +26,27 @@ def test_a_model_of_one_finger_stands_for_all_four() -> None:
     np.testing.assert_array_equal(constants.kd, expected)
 
 
+def test_a_model_of_a_single_servo_stands_for_every_joint(capsys) -> None:
+    friction = EffectEstimate(effect="load_dependent_friction@servo", parameters={"coefficient": estimate(0.3, 0.1)})
+    model = ModelFile(
+        joints=["servo"],
+        values={"kp": {"servo": estimate(0.9)}},
+        effects=[friction],
+        offsets={"servo": estimate(0.02, 0.01)},
+    )
+    constants, randomization, effects = identified(model, EpisodeConstants(), WIDE, JOINTS)
+    np.testing.assert_array_equal(constants.kp, np.full(12, 0.9))
+    assert [(one.name, one.joint) for one in effects] == [("load_dependent_friction", joint) for joint in JOINTS]
+    assert randomization.joint_offset == WIDE.joint_offset
+    assert "taken for the drive of each of its 12 joints" in capsys.readouterr().err
+
+
+def test_a_drive_stated_as_rigid_keeps_the_hands_stiffness() -> None:
+    model = of_finger(values={"stiffness": {"q2": Estimate(value=np.inf, low=np.inf, high=np.inf)}})
+    constants, _, _ = identified(model, EpisodeConstants(), WIDE, JOINTS)
+    np.testing.assert_array_equal(constants.stiffness, EpisodeConstants().stiffness)
+
+
 def test_an_interval_replaces_the_range_and_a_bare_value_keeps_it() -> None:
     values = {"kd": {name: estimate(0.3, 0.01) for name in ("q1", "q2", "q3")}, "kp": {"q1": estimate(4.0)}}
     constants, randomization, _ = identified(of_finger(values=values), EpisodeConstants(), WIDE, JOINTS)

@@ -19,7 +19,7 @@ class Criteria:
         significant: probability that a named set is chance, all that was looked at counted.
         most: share of the excess error that an explanation explains at least; a further effect, of what is left.
         nearly_whole: share from which on it is the whole but for a detail.
-        most_simulated: trial time that a search may simulate [s]; then it ends with its best answer.
+        most_simulated: steps, times joints, that a search may simulate; then it ends with its best answer.
         margin: part of a joint's limits (half its range, its speed, its torque) that a proposed command keeps free.
     """
 
@@ -32,7 +32,7 @@ class Criteria:
     significant: float = 0.01
     most: float = 0.9
     nearly_whole: float = 0.98
-    most_simulated: float = 3e5
+    most_simulated: float = 4.5e8
     margin: float = 0.1
 
     def __post_init__(self) -> None:

@@ -232,7 +232,7 @@ def diagnose_recording(
     inquiry, left_out, suspected = beside_disturbances(replace(whole, standard=standard.proposal))
     search, findings, simulations, _ = answer = inquiry.answer
     if findings.stopped:
-        say(f"stopped early, after {search.shooting.simulated:.0f} s of simulated trials; next: {findings.stopped}")
+        say(f"stopped early, after {search.shooting.simulated:.2g} simulated steps; next: {findings.stopped}")
     _, held_out, tested = inquiry.parts
     test = held_out if tested is None else tested
     untouched = HeldOut(search.shooting, test, search.noise, nominal_model(test, known).offsets)

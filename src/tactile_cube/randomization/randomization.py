@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects import Effect, Stage, resolve
-from tactile_cube.drivetrain.effects.catalogue import matching_joints
+from tactile_cube.drivetrain.effects.catalogue import matching_joints, named_joints
 from tactile_cube.drivetrain.model_file import Estimate, ModelFile
-from tactile_cube.errors import InputError
+from tactile_cube.errors import InputError, warn
 from tactile_cube.simulation import EpisodeConstants
 from tactile_cube.simulation.contact_effects import contact_catalogue
 
@@ -267,13 +267,16 @@ def identified(
 ) -> tuple[EpisodeConstants, Randomization, list[Effect]]:
     """Return the identified hand: fitted values as nominal ones, intervals as ranges, effects added.
 
-    A model of one finger (q1, q2, q3) applies to all four. Constants that were fitted are drawn from their intervals;
-    those that were not keep the relative range of `randomization` around the model's value. `joints` are the hand's, in
-    the order of the constants' vectors.
+    A model of one finger (q1, q2, q3) applies to all four, that of a single servo to every joint. Constants that were
+    fitted are drawn from their intervals; those that were not keep the relative range of `randomization` around the
+    model's value. A drive stated as rigid keeps the hand's stiffness, which a world has to know.
+
+    `joints` are the hand's, in the order of the constants' vectors.
 
     Raises:
         InputError: joints, effects or limits that the hand does not have.
     """
+    model = of_every_joint(model, joints)
     nominal: dict[str, Any] = {key: np.array(getattr(constants, key)) for key in PER_JOINT}
     ranges: dict[str, Distribution] = dict(randomization.values)
     factors, shifts = dict(randomization.factors), dict(randomization.shifts)
@@ -311,6 +314,28 @@ def identified(
     return *identified_contact(model, known, changed), effects
 
 
+def of_every_joint(model: ModelFile, joints: Sequence[str]) -> ModelFile:
+    """Return the model of a single servo, identified on a bench, as that of each joint of a hand; others as they are.
+
+    Its offset is that unit's own and is left out.
+    """
+    servo = model.joints[0]
+    if len(model.joints) > 1 or named_joints(servo, joints):
+        return model
+    warn(f"model of '{servo}', which the hand does not have: taken for the drive of each of its {len(joints)} joints")
+    effects = [
+        one.model_copy(update={"effect": f"{one.name}@{joint}"}) for one in model.drive_effects for joint in joints
+    ]
+    return model.model_copy(
+        update={
+            "joints": list(joints),
+            "values": {key: dict.fromkeys(joints, row[servo]) for key, row in model.values.items()},
+            "effects": [*effects, *model.object_effects],
+            "offsets": {},
+        }
+    )
+
+
 def identified_contact(
     model: ModelFile, constants: EpisodeConstants, randomization: Randomization
 ) -> tuple[EpisodeConstants, Randomization]:
@@ -339,7 +364,7 @@ def _on_joints(estimates: Mapping[str, Estimate], nominal: Array, joints: Sequen
     """Return the low end, value and high end (joints,); nominal where nothing is stated."""
     low, value, high = nominal.copy(), nominal.copy(), nominal.copy()
     for name, estimate in estimates.items():
-        for joint in matching_joints(name, joints):
+        for joint in matching_joints(name, joints) if estimate.finite else ():
             index = list(joints).index(joint)
             low[index], value[index], high[index] = estimate.low, estimate.value, estimate.high
     return low, value, high

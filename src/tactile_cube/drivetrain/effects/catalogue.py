@@ -135,15 +135,20 @@ def resolve(names: Sequence[str], joints: Sequence[str]) -> list[tuple[EffectCla
     return placed
 
 
+def named_joints(joint: str, joints: Sequence[str]) -> list[str]:
+    """Return the joint of that name, or else those whose name ends in it after `_`, `/` or `.`; there may be none."""
+    if joint in joints:
+        return [joint]
+    return [name for name in joints if joint and name.endswith(tuple(mark + joint for mark in "_/."))]
+
+
 def matching_joints(joint: str, joints: Sequence[str]) -> list[str]:
     """Return the joint of that name, or else those whose name ends in it after `_`, `/` or `.` (one per finger).
 
     Raises:
         InputError: there is none.
     """
-    if joint in joints:
-        return [joint]
-    found = [name for name in joints if joint and name.endswith(tuple(mark + joint for mark in "_/."))]
+    found = named_joints(joint, joints)
     if not found:
         near = suggestion(joint, [*joints, *(re.split("[_/.]", name)[-1] for name in joints)])
         raise InputError(f"joint '{joint}' is unknown; the joints are {', '.join(joints)}{near}")

@@ -80,7 +80,7 @@ class Simulator:
         # the whole catalogue: one kernel, compiled once, for every model of this rig
         known = tuple(dict.fromkeys([*catalogue().values(), *effects]))
         self.plant = Plant([self.tree], recording.step / self.substeps, known, recording.joints)
-        self.simulated = 0.0  # trial time that models were simulated through [s]; those that follow a path a third
+        self.simulated = 0.0  # steps of single joints that were simulated; those that follow a path count a third
         self.workers = min(4, len(os.sched_getaffinity(0)))
         self._pool = ThreadPoolExecutor(self.workers)
 
@@ -142,7 +142,8 @@ class Simulator:
         return path
 
     def _count(self, models: float, windows: Windows) -> None:
-        self.simulated += models * len(windows) * windows.measured.shape[1] * self.recording.step / self.time
+        joint_steps = windows.measured.shape[1] * self.substeps * len(self.recording.joints)
+        self.simulated += models * len(windows) * joint_steps
 
     def _mechanics(self, memory: Array) -> Array:
         return np.concatenate([self.plant.view(memory, key).ravel() for key in MECHANICS])
