@@ -41,10 +41,13 @@ def test_a_model_of_a_single_servo_stands_for_every_joint(capsys) -> None:
     assert "taken for the drive of each of its 12 joints" in capsys.readouterr().err
 
 
-def test_a_drive_stated_as_rigid_keeps_the_hands_stiffness() -> None:
-    model = of_finger(values={"stiffness": {"q2": Estimate(value=np.inf, low=np.inf, high=np.inf)}})
+def test_what_is_infinite_stays_the_hands_own() -> None:
+    none = {"q2": Estimate(value=np.inf, low=np.inf, high=np.inf)}
+    model = of_finger(values={"stiffness": none, "torque_limit": none, "kd": {"q2": estimate(0.3)}})
     constants, _, _ = identified(model, EpisodeConstants(), WIDE, JOINTS)
     np.testing.assert_array_equal(constants.stiffness, EpisodeConstants().stiffness)
+    assert constants.torque_limit == EpisodeConstants().torque_limit
+    assert list(model.of_a_hand().values) == ["kd"]
 
 
 def test_an_interval_replaces_the_range_and_a_bare_value_keeps_it() -> None:

@@ -302,7 +302,7 @@ def plain_settings(job: Job) -> dict[str, Any]:
         del plain["stages"], plain["judgement"]
     environment = plain["env"]
     if job.config.model is not None:
-        environment["model"] = read_model(job.config.model).model_dump()
+        environment["model"] = read_model(job.config.model).of_a_hand().model_dump()
     hand = environment.get("hand") or {}
     if "urdf" in hand:
         hand["sha256"] = hashlib.sha256(urdf_file(hand["urdf"]).read_bytes()).hexdigest()

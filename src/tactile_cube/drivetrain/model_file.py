@@ -141,6 +141,11 @@ class ModelFile(Strict):
         """The effects of fingertips and object."""
         return [one for one in self.effects if one.of_object]
 
+    def of_a_hand(self) -> "ModelFile":
+        """Return the model without infinite values: of a rig that is rigid or not limited, they say nothing of a hand."""
+        values = {key: {joint: one for joint, one in row.items() if one.finite} for key, row in self.values.items()}
+        return self.model_copy(update={"values": {key: row for key, row in values.items() if row}})
+
     def with_effects(self, found: Sequence[EffectEstimate]) -> list[EffectEstimate]:
         """Return its effects and those found, which take the place of those of the same name."""
         names = {one.effect for one in found}

@@ -269,14 +269,14 @@ def identified(
 
     A model of one finger (q1, q2, q3) applies to all four, that of a single servo to every joint. Constants that were
     fitted are drawn from their intervals; those that were not keep the relative range of `randomization` around the
-    model's value. A drive stated as rigid keeps the hand's stiffness, which a world has to know.
+    model's value. What is infinite in the model, as of a rigid rig without a limit, stays the hand's own.
 
     `joints` are the hand's, in the order of the constants' vectors.
 
     Raises:
         InputError: joints, effects or limits that the hand does not have.
     """
-    model = of_every_joint(model, joints)
+    model = of_every_joint(model.of_a_hand(), joints)
     nominal: dict[str, Any] = {key: np.array(getattr(constants, key)) for key in PER_JOINT}
     ranges: dict[str, Distribution] = dict(randomization.values)
     factors, shifts = dict(randomization.factors), dict(randomization.shifts)
@@ -364,7 +364,7 @@ def _on_joints(estimates: Mapping[str, Estimate], nominal: Array, joints: Sequen
     """Return the low end, value and high end (joints,); nominal where nothing is stated."""
     low, value, high = nominal.copy(), nominal.copy(), nominal.copy()
     for name, estimate in estimates.items():
-        for joint in matching_joints(name, joints) if estimate.finite else ():
+        for joint in matching_joints(name, joints):
             index = list(joints).index(joint)
             low[index], value[index], high[index] = estimate.low, estimate.value, estimate.high
     return low, value, high
