@@ -142,7 +142,7 @@ class ModelFile(Strict):
         return [one for one in self.effects if one.of_object]
 
     def of_a_hand(self) -> "ModelFile":
-        """Return the model without infinite values: of a rig that is rigid or not limited, they say nothing of a hand."""
+        """Return the model without infinite values: a rig that is rigid or not limited says nothing of a hand."""
         values = {key: {joint: one for joint, one in row.items() if one.finite} for key, row in self.values.items()}
         return self.model_copy(update={"values": {key: row for key, row in values.items() if row}})
 
