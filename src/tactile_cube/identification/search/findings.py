@@ -121,7 +121,7 @@ def find(search: Search, standard: Proposal | None = None) -> Findings:
         looked,
     )
     chosen: Explanation | None = None
-    while first and (good := found.proven(search.criteria)):
+    while first and not search.spent and (good := found.proven(search.criteria)):
         before, chosen = chosen, simplest(sound(good, base, search.criteria, looked), search.criteria)
         search.stand(f"{chosen.label} ({chosen.error:.2f} x sensor noise on held-out trials)", "its possible twins")
         if chosen is before or not nameable(chosen, base, search.criteria):
