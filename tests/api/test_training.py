@@ -4,6 +4,7 @@ import csv
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import torch
 from omegaconf import OmegaConf
@@ -13,9 +14,11 @@ from benchmarks.paper.model_card import read_ancestry
 from tactile_cube import InputError
 from tactile_cube.agent.networks import Actor, Sizes
 from tactile_cube.agent.policy_file import PolicyInfo, load_actor, save_policy
+from tactile_cube.agent.policy_parts import require_parts
 from tactile_cube.api import training
 from tactile_cube.api.job import Job, worded_job
 from tactile_cube.api.training import TrainingResult
+from tactile_cube.drivetrain.model_file import Estimate, ModelFile, write_model
 from tactile_cube.hand.urdf_hand import DESCRIPTIONS
 from tactile_cube.training.run import INTERRUPTED, Run
 
@@ -102,6 +105,19 @@ def test_a_hand_in_a_file_of_its_owners_gets_grasps_of_its_own_and_its_policy_is
     save_policy(tmp_path / "worlds" / "policy.safetensors", actor, told)
     assert training.judged(job, tmp_path / "worlds") == "trained and judged"
     assert (tmp_path / "mujoco" / "results.json").is_file()
+
+
+def test_a_policy_is_told_nothing_infinite_of_the_servo_it_was_trained_with(tmp_path: Path) -> None:
+    """JSON knows no infinity: a policy trained with a rigid bench's model could not be read again."""
+    rigid = Estimate(value=np.inf, low=np.inf, high=np.inf)
+    values = {"stiffness": {"servo": rigid}, "kp": {"servo": Estimate(value=0.9, low=0.8, high=1.0)}}
+    write_model(ModelFile(joints=["servo"], values=values), tmp_path / "model.yaml")
+    job = worded_job("train", ("+experiment=smoke", f"model={tmp_path}/model.yaml"), tmp_path)
+    told = PolicyInfo.describe(Actor(Sizes(120, 0, 12), (8,)), config=training.plain_settings(job))
+    save_policy(tmp_path / "policy.safetensors", Actor(Sizes(120, 0, 12), (8,)), told)
+    _, info = load_actor(tmp_path / "policy.safetensors")
+    assert list(info.config["env"]["model"]["values"]) == ["kp"]
+    assert "model" in require_parts(info.config["env"], "it")
 
 
 def test_a_stage_that_cannot_be_composed_is_an_input_error(tmp_path: Path) -> None:
