@@ -319,9 +319,9 @@ def of_every_joint(model: ModelFile, joints: Sequence[str]) -> ModelFile:
 
     Its offset is that unit's own and is left out.
     """
-    servo = model.joints[0]
-    if len(model.joints) > 1 or named_joints(servo, joints):
+    if len(model.joints) != 1 or named_joints(model.joints[0], joints):
         return model
+    (servo,) = model.joints
     warn(f"model of '{servo}', which the hand does not have: taken for the drive of each of its {len(joints)} joints")
     effects = [
         one.model_copy(update={"effect": f"{one.name}@{joint}"}) for one in model.drive_effects for joint in joints
