@@ -18,7 +18,7 @@ from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.resolution import Fitted, needless, resolved
 from tactile_cube.identification.next_experiment import Experiment, next_experiment
 from tactile_cube.identification.search.candidates import first_term
-from tactile_cube.identification.search.evidence import HeldOut, gain, judge, worse
+from tactile_cube.identification.search.evidence import HeldOut, as_good, gain, judge
 from tactile_cube.identification.search.explanation import Explanation, Proposal, named_by
 from tactile_cube.identification.search.findings import CommonOffset, Findings, common_offsets, find, reached
 from tactile_cube.identification.search.proposals import MORE_STEPS, stepped, without
@@ -282,7 +282,7 @@ def diagnose_recording(
 def without_needless(answer: Answer) -> Verdict:
     """Return the verdict without the effects whose final intervals include their neutral values.
 
-    It stays as it is if the others predict the held-out trials worse alone.
+    It stays as it is if the others alone are not as good on the held-out trials.
     """
     search, findings, simulations, verdict = answer
     chosen = verdict.chosen
@@ -293,7 +293,7 @@ def without_needless(answer: Answer) -> Verdict:
     if not idle or len(idle) == len(chosen.effects):
         return verdict
     less = search.explained(without(search, chosen, *idle), findings.looked)
-    if worse(less.judgement, chosen.judgement, search.criteria):
+    if not as_good(less.judgement, chosen.judgement, search.criteria):
         return verdict
     return instead_of(verdict, less)
 
@@ -301,7 +301,7 @@ def without_needless(answer: Answer) -> Verdict:
 def in_simpler_laws(answer: Answer, verdict: Verdict) -> Verdict:
     """Return the verdict with each effect as the simpler law that it becomes at a value within its final interval.
 
-    It stays as it is if the simpler law predicts the held-out trials worse.
+    It stays as it is if the simpler law is not as good on the held-out trials.
     """
     search, findings, simulations, _ = answer
     for place in reversed(range(len(verdict.chosen.effects))):
@@ -321,7 +321,7 @@ def in_simpler_laws(answer: Answer, verdict: Verdict) -> Verdict:
         refitted = (stepped(search.problem, parent, one, MORE_STEPS) for one in simpler)
         best, begun = min(refitted, key=lambda one: one[1].cost)
         tried = Proposal((*left.effects, best), search.refitted(begun.model))
-        if not worse((less := search.explained(tried, findings.looked)).judgement, chosen.judgement, search.criteria):
+        if as_good((less := search.explained(tried, findings.looked)).judgement, chosen.judgement, search.criteria):
             verdict = instead_of(verdict, less)
     return verdict
 

@@ -8,6 +8,7 @@ from scipy.stats import ttest_1samp
 
 from tactile_cube.identification.search.evidence import (
     Judgement,
+    as_good,
     charged,
     correlation_length,
     in_blocks,
@@ -44,6 +45,7 @@ def test_differences_are_held_against_their_scatter_from_block_to_block() -> Non
     few = replace(before, costs=before.costs[:4], samples=before.samples[:4], trial=before.trial[:4])
     steady = replace(few, costs=few.costs + np.array([390.0, 410.0, 400.0, 400.0]))
     assert (p_value(steady, few), worse(steady, few)) == (0.5, False), "four blocks prove nothing"
+    assert not as_good(steady, few), "nor that twice the squared error is as good"
 
 
 def test_the_same_difference_many_times_is_no_proof() -> None:

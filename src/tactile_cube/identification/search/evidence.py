@@ -104,13 +104,20 @@ def gain(before: Judgement, after: Judgement) -> float:
 def worse(other: Judgement, best: Judgement, criteria: Criteria = STANDARD) -> bool:
     """Return whether the held-out trials reject `other` in favour of the best model.
 
-    The difference has to exceed `band` standard deviations from block to block, the gain of a law by chance beside
-    slightly wrong constants, and a part (`detail`) of what the better model leaves unexplained itself.
+    The difference has to exceed `band` standard deviations from block to block, and what `as_good` allows.
     """
-    difference = other.costs - best.costs
+    return not as_good(other, best, criteria) and standing_out(likelihood(other, best), best) > criteria.band
+
+
+def as_good(other: Judgement, best: Judgement, criteria: Criteria = STANDARD) -> bool:
+    """Return whether `other` errs by little more than the best model: what can be removed must not be missed.
+
+    The difference may be the gain of a law by chance beside slightly wrong constants, and a part (`detail`) of what
+    the better model leaves unexplained itself.
+    """
     unexplained = max(float(best.costs.sum() - best.samples.sum()), 0.0)
     allowed = criteria.least_gain * float(best.samples.sum()) + criteria.detail * unexplained
-    return bool(difference.sum() > allowed and standing_out(likelihood(other, best), best) > criteria.band)
+    return bool((other.costs - best.costs).sum() <= allowed)
 
 
 def lacking(less: Judgement, more: Judgement, criteria: Criteria = STANDARD, looked_at: int = 1) -> bool:
