@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 
@@ -40,6 +41,7 @@ def identification(
     kinds: int = 3,
     session: float = 12.0,
     hidden: Sequence[Sequence[str]] = HIDDEN,
+    bench: Mapping[str, Any] | None = None,
 ) -> Section:
     """Damping, dry friction and rotor inertia of three joints, from trials without joint offsets.
 
@@ -50,6 +52,7 @@ def identification(
         kinds: of excitation, one trial each.
         session: duration of a trial of the sessions that are diagnosed [s].
         hidden: effects of each of these sessions.
+        bench: further settings of these sessions, of `SimulatedRig`.
     """
     title = f"fit of a finger's constants to trials of {duration:g} s; note: free-running error on held-out trials"
     section = Section("identification", title, YARDSTICK)
@@ -63,30 +66,32 @@ def identification(
         _note(found, "tactile_cube, base fit", *_ours(fitted, held_out))
         if mujoco is not None and sysid is not None:
             _note(found, YARDSTICK, *_theirs(mujoco, sysid, fitted, held_out))
-    section.figures = [*_figures(found), *diagnoses(session, hidden)]
+    section.figures = [*_figures(found), *diagnoses(session, hidden, bench or {})]
     return section
 
 
-def diagnoses(trial: float, hidden: Sequence[Sequence[str]]) -> list[Figure]:
-    """Diagnoses of bench sessions of 12 trials with a finger's three joints, once each: they take long.
+def diagnoses(trial: float, hidden: Sequence[Sequence[str]], bench: Mapping[str, Any]) -> list[Figure]:
+    """Diagnoses of bench sessions, of 12 trials with a finger's three joints, once each: they take long.
 
     The whole command, from its start to the written report; the finger's kernels are compiled before.
 
     Args:
         trial: duration of a trial [s].
         hidden: effects of each session.
+        bench: further settings.
     """
     nominal = NOMINAL | {"stiffness": 25.0}
     figures = []
     for names in [(), *hidden]:
-        rig = SimulatedRig(controller=CONTROLLER, nominal=nominal, hidden=names, duration=trial, validation=False)
+        settings: dict[str, Any] = {"hidden": names, "duration": trial, "validation": False, **bench}
+        tables = SimulatedRig(controller=CONTROLLER, nominal=nominal, **settings).recordings(seed=3)[""]
         with tempfile.TemporaryDirectory() as folder:
-            write_recording(Path(folder, "bench"), rig.recordings(seed=3)[""])
+            write_recording(Path(folder, "bench"), tables)
             words = [f"recording={folder}/bench", f"hydra.run.dir={folder}/run"]
             spent = run_and_watch(["tactile_cube.diagnose", *words])
             verdict = json.loads(Path(folder, "run", "diagnosis.json").read_text(encoding="utf-8"))["verdict"]
         name = f"diagnosis, {' and '.join(names) or 'nothing'} hidden"
-        note = f"12 trials of {trial:g} s, {spent.wall:.0f} s on the clock: {verdict}"
+        note = f"{len(tables.tables)} trials of {trial:g} s, {spent.wall:.0f} s on the clock: {verdict}"
         figures.append(Figure(name, spent.cpu, spent.cpu, spent.cpu, "s of processor time", None, note))
     return figures[1:]  # the first one compiled
 

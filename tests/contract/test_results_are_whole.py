@@ -8,7 +8,6 @@ import os
 import re
 import resource
 import shutil
-import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
@@ -294,18 +293,17 @@ LIMIT = 30_000
 
 def test_a_command_on_a_full_disk_says_so_in_one_line_and_leaves_what_was_there(folder: Path, tmp_path: Path) -> None:
     measured = recorded(folder, "on_disk", 0)
-    words = [sys.executable, "-m", "tactile_cube.compare", f"recording={measured.folder}", f"hydra.run.dir={tmp_path}"]
-    words += ["band.simulations=3"]
-    subprocess.run(words, check=True, capture_output=True)
+    words = [f"recording={measured.folder}", f"hydra.run.dir={tmp_path}", "band.simulations=3"]
+    typed("compare", *words)
     before = contents(tmp_path)
     assert len(before["report.html"]) > LIMIT
-
-    def limited() -> None:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (LIMIT, LIMIT))
-
-    again = subprocess.run(words, capture_output=True, text=True, preexec_fn=limited, check=False)
-    assert again.returncode == 2
-    assert re.fullmatch(f"error: .*: {DISK_IS_FULL}", again.stderr.strip().splitlines()[-1])
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (LIMIT, hard))
+    try:
+        with pytest.raises(InputError, match=f"^.*: {DISK_IS_FULL}$"):
+            typed("compare", *words)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     after = contents(tmp_path)
     for name in ("comparison.json", "report.html", "comparison.rrd"):
         assert after[name] == before[name]

@@ -4,9 +4,11 @@ import os
 import re
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
+from hydra.core.plugins import Plugins
 
 from tactile_cube.agent.policy_file import load_actor
 from tactile_cube.composition import with_recipe
@@ -157,7 +159,7 @@ def test_a_sweep_keeps_its_record_in_its_own_folder(tmp_path: Path, monkeypatch:
     assert not list(tmp_path.rglob(".sweep-*"))
 
 
-def test_a_sweeper_is_given_the_objective_of_each_run(tmp_path: Path) -> None:
+def test_a_sweeper_is_given_the_objective_of_each_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "hydra_plugins").mkdir()
     (tmp_path / "hydra_plugins" / "searching.py").write_text(
         "from hydra._internal.core_plugins.basic_sweeper import BasicSweeper\n"
@@ -166,18 +168,10 @@ def test_a_sweeper_is_given_the_objective_of_each_run(tmp_path: Path) -> None:
         "        print('objectives', *[run.return_value for run in super().sweep(arguments)[0]])\n"
     )
     words = ["policy=hold", "protocol=smoke", "protocol.seconds=0.2", "film=false", "seed=0,-1"]
-    command = [
-        sys.executable,
-        "-m",
-        "tactile_cube",
-        "evaluate",
-        "-m",
-        *words,
-        "hydra.sweeper._target_=hydra_plugins.searching.Searching",
-    ]
-    run = subprocess.run(
-        command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, timeout=280, check=False
-    )
+    monkeypatch.syspath_prepend(tmp_path)
+    Plugins.instance().register(import_module("hydra_plugins.searching").Searching)  # found as a process starts
+    sweeper = "hydra.sweeper._target_=hydra_plugins.searching.Searching"
+    run = typed("evaluate", "-m", *words, sweeper, folder=tmp_path)
     assert run.returncode == 1  # the second seed is refused, and has no objective
     first, second = next(line for line in run.stdout.splitlines() if line.startswith("objectives")).split()[1:]
     assert abs(float(first)) < 1.0

@@ -20,9 +20,14 @@ def stribeck_recording(folder: Path) -> Recording:
 
 
 def partly_known(folder: Path) -> Recording:
-    """The same on a shaking table, which no effect of the catalogue describes."""
+    """The same on a shaking table, which no effect of the catalogue describes.
+
+    It shakes differently each time: where a law followed a part of it, a search would go on far longer.
+    """
+    rng = np.random.default_rng(0)
     for trial in stribeck_recording(folder).trials:
         table = polars.read_parquet(folder / trial.file)
-        shaken = trial.position[:, 0] + 8e-3 * np.sin(44.0 * trial.time + 9.0 * trial.position[0, 0])
+        shaking = sum(np.sin(speed * trial.time + rng.uniform(0.0, 2 * np.pi)) for speed in (44.0, 61.0))
+        shaken = trial.position[:, 0] + 5e-3 * shaking
         table.with_columns(polars.Series("a.position", shaken)).write_parquet(folder / trial.file)
     return read_recording(folder)

@@ -278,8 +278,8 @@ def test_the_judge_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.
 @pytest.mark.skipif(importlib.util.find_spec("tactile_cube.diagnose") is None, reason="no diagnose command")
 @pytest.mark.parametrize(("seed", "names"), [(3, []), (4, ["command_delay"])])
 def test_diagnosis_of_a_short_recording(seed: int, names: list[str], tmp_path: Path) -> None:
-    generator.write(seed, tmp_path, QUICK, names, "pendulum")
+    generator.write(seed, tmp_path, 0.5 * QUICK, names, "pendulum")
     truth = json.loads((tmp_path / "truth.json").read_text())
-    answer = judge.run_command("diagnose", tmp_path / "answer", f"recording={tmp_path / 'recording'}")
+    answer = judge.run_command("diagnose", tmp_path / "answer", f"recording={tmp_path / 'recording'}", "report=false")
     assert answer is not None, (tmp_path / "answer" / "words.txt").read_text()
     assert score(truth, answer, None).outcome in ("right", "acceptable"), answer["verdict"]

@@ -14,12 +14,15 @@ from benchmarks.speed.startup import startup
 from benchmarks.speed.update import update
 from tactile_cube.simulation import SimulationOptions
 
+ONE_JOINT = {"joints": ["q2"], "kinds": ("ramps", "multisine"), "initialisations": 2}
 SMALL = {
     "environment": partial(environment, 1, peers=False, calls=1),
     "accuracy": partial(accuracy, {"fast": SimulationOptions()}, SimulationOptions(solver_iterations=60)),
     "update": partial(update, 1, peers=False, calls=1, hidden=16),
     "end_to_end": partial(end_to_end, 1, peers=False, worlds=2, steps=3, updates=1, hidden=16),
-    "identification": partial(identification, 1, peers=False, duration=2.0, kinds=2, session=2.0, hidden=[()]),
+    "identification": partial(
+        identification, 1, peers=False, duration=1.0, kinds=1, session=2.0, hidden=[()], bench=ONE_JOINT
+    ),
     "startup": partial(startup, 1, commands=("--help",), trains=False),
 }
 
