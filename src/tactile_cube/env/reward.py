@@ -119,8 +119,9 @@ def advance(step: Step) -> float:
     """Return the fingertips' total motion ahead of the object, against its rotation [rad]. Not in the paper.
 
     A finger that turns with the object adds nothing; one that moves back to regrasp adds its motion at once, long
-    before the rotation that this makes possible. The fingers' reach bounds the sum over an episode unless the object
-    rotates: moving to and fro earns nothing.
+    before the rotation that this makes possible. About the vertical, the fingers' reach bounds the sum over an episode
+    unless the object rotates: moving to and fro earns nothing. About another axis a fingertip may circle the axis in
+    front of a face, and earn without end.
     """
     way = np.remainder(step.azimuths - step.azimuths_before + np.pi, 2.0 * np.pi) - np.pi
     return float(len(way) * spin(step) - step.direction * way.sum())
