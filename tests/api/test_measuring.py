@@ -14,7 +14,12 @@ from tactile_cube.api.job import worded_job
 from tactile_cube.drivetrain.model_file import ModelFile
 from tests.measurement.small_rig import URDF, setting, table, write
 
-RIG = {"joints": ["b"], "duration": 3, "initialisations": 2, "kinds": ["ramps", "multisine"]}
+RIG = {
+    "source.joints": ["b"],
+    "source.duration": 3,
+    "source.initialisations": 2,
+    "source.kinds": ["ramps", "multisine"],
+}
 """Of source="rig"."""
 
 
@@ -136,10 +141,8 @@ def test_an_effect_that_cannot_act_at_its_joint_is_told(tmp_path: Path) -> None:
 def test_record_identify_and_know_it_afterwards(tmp_path: Path) -> None:
     """The notebook of the examples has its effect named by a diagnosis."""
     (tmp_path / "two.urdf").write_text(URDF)
-    rig = RIG | {"urdf": tmp_path / "two.urdf", "hidden": ["torque_bias@b: bias=0.05"]}
-    measured = tactile_cube.record(
-        tmp_path / "made", source="rig", values={f"source.{key}": value for key, value in rig.items()}
-    )
+    rig = RIG | {"source.urdf": tmp_path / "two.urdf", "source.hidden": ["torque_bias@b: bias=0.05"]}
+    measured = tactile_cube.record(tmp_path / "made", source="rig", values=rig)
     assert list(measured) == ["", "validation"]
     fitted = tactile_cube.identify(measured[""], ["torque_bias@b"], say=quiet)
     bias = fitted.model.effects[0].parameters["bias"]
