@@ -91,6 +91,20 @@ def test_fingertips_go_ahead_about_the_tasks_axis(axis: Any, scripted_world: Any
     assert terms["advance"] == pytest.approx(4 * terms["spin"] - ways.sum())
 
 
+def test_a_fingertip_that_circles_the_axis_earns_nothing_by_it(scripted_world: Any, rotation_task: MakeTask) -> None:
+    world = scripted_world(turn=0.0)
+    env = rotation_task(world, reward=Reward(advance=1.0))
+    env.reset()
+    place = env.reward.terms.index("advance")
+    earned = []
+    for angle in [0.0] * 40 + list(np.linspace(0.0, -2.0 * np.pi, 17)):  # at first the joints come to rest
+        round_it = tip_positions(DLR_HAND2, world.q)[0] + 0.005 * np.array([np.cos(angle), np.sin(angle), 0.0])
+        world.shift = round_it - world.cube_position
+        earned.append(env.step(np.zeros(12)).reward_terms[place])
+    assert sum(earned[40:]) == pytest.approx(0.0, abs=1e-6)
+    assert max(np.abs(earned[40:])) > 0.3
+
+
 def test_the_time_limit_truncates(rotation_task: MakeTask) -> None:
     env = rotation_task(task=Task("full", episode_steps=3))
     env.reset()

@@ -61,6 +61,9 @@ def test_an_effect_that_may_be_nothing_is_no_part_of_a_claim(tmp_path: Path) -> 
 
     assert named_by(both.effects) == {("coulomb_friction", "a"), ("torque_bias", "a")}
     assert claimed(both) == claimed(alone) == {("coulomb_friction", "a")}
+    search.criteria = replace(STANDARD, band=np.inf)
+    missed = replace(both, judgement=replace(both.judgement, costs=0.5 * both.judgement.costs))
+    assert claimed(missed) == named_by(both.effects), "twice the squared error is a loss, proven or not"
 
 
 @pytest.mark.parametrize(

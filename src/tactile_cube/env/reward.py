@@ -31,7 +31,7 @@ class Step:
         limit: largest rotation that earns [rad].
         lost: whether the step loses the object.
         proximal_angles: q1 of each finger at the end [rad].
-        azimuths_before: of each fingertip about the object's middle `(fingers,)` [rad].
+        azimuths_before: of each fingertip about the object's middle, from where it began `(fingers,)` [rad].
         azimuths: the same at the end.
         forces: normal force on the object of each finger's other links and of its tip `(2, fingers)` [N].
     """
@@ -119,11 +119,10 @@ def advance(step: Step) -> float:
     """Return the fingertips' total motion ahead of the object, against its rotation [rad]. Not in the paper.
 
     A finger that turns with the object adds nothing; one that moves back to regrasp adds its motion at once, long
-    before the rotation that this makes possible. About the vertical, the fingers' reach bounds the sum over an episode
-    unless the object rotates: moving to and fro earns nothing. About another axis a fingertip may circle the axis in
-    front of a face, and earn without end.
+    before the rotation that this makes possible. The sum over an episode is bounded unless the object rotates: moving
+    to and fro earns nothing, nor does circling the axis, which is taken back once it is half round.
     """
-    way = np.remainder(step.azimuths - step.azimuths_before + np.pi, 2.0 * np.pi) - np.pi
+    way = step.azimuths - step.azimuths_before
     return float(len(way) * spin(step) - step.direction * way.sum())
 
 

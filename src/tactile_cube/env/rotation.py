@@ -113,7 +113,8 @@ class RotationEnv:
         self._weights = self.reward.weights(self.conditions.penalty_scale)
         self._limit = self.reward.fastest * self.world.options.policy_dt
         self._first = self._pose = self._pose_now(None)
-        self._tips = self._azimuths()
+        self._began = self._azimuths()
+        self._tips = np.zeros_like(self._began)
         self._moment = self._observe(np.zeros(len(self.reward.terms)), RUNNING, 0)
         return self._moment
 
@@ -149,7 +150,8 @@ class RotationEnv:
         return np.arctan2(places[:, 1], places[:, 0])
 
     def _measure(self, before: CubePose, after: CubePose, outcome: int) -> Array:
-        azimuths, self._tips = self._tips, self._azimuths()
+        azimuths = self._tips
+        self._tips = np.remainder(self._azimuths() - self._began + np.pi, 2.0 * np.pi) - np.pi
         step = Step(
             first=self._first,
             before=before,
