@@ -139,7 +139,7 @@ def test_an_effect_that_cannot_act_at_its_joint_is_told(tmp_path: Path) -> None:
 
 
 def test_record_identify_and_know_it_afterwards(tmp_path: Path) -> None:
-    """The notebook of the examples has its effect named by a diagnosis."""
+    """The test of the examples' notebook has such an effect named by a diagnosis."""
     (tmp_path / "two.urdf").write_text(URDF)
     rig = RIG | {"source.urdf": tmp_path / "two.urdf", "source.hidden": ["torque_bias@b: bias=0.05"]}
     measured = tactile_cube.record(tmp_path / "made", source="rig", values=rig)
