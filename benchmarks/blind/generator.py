@@ -20,7 +20,7 @@ import polars as pl
 import yaml
 from numpy.typing import NDArray
 
-from benchmarks.blind import hidden, logs, sizes
+from benchmarks.blind import hidden, logs, pairs, sizes
 from benchmarks.blind.excitation import KINDS
 from benchmarks.blind.forms import BESIDE, FAMILIES
 from benchmarks.blind.physics import simulate
@@ -33,9 +33,12 @@ ATTEMPTS = 4
 """Worlds that a seed may draw until one runs through all its trials; some effects drive their joint."""
 VISIBLE = 1.5
 """A visible effect moves its joint by at least this multiple of the sensor noise, refitted constants removed."""
-WORLDS = {"usual": draw_usual, "sizes": sizes.draw_machine, "forms": draw_usual, "logs": logs.draw_log}
+WORLDS = {
+    "usual": draw_usual, "sizes": sizes.draw_machine, "forms": draw_usual, "logs": logs.draw_log,
+    "pairs": pairs.draw_pair, "twins": pairs.draw_twin,
+}  # fmt: skip
 """What may be measured: the usual rigs, machines of any size, the usual rigs with laws as other authors write them, the
-usual rigs with controllers and logs as strangers have them."""
+usual rigs with controllers and logs as strangers have them, two joints with an effect each, one joint with a twin."""
 
 
 def visibility(plain: World, changed: World, joint: int, noise: float, seed: int) -> dict[str, float]:
@@ -123,6 +126,10 @@ def names_for(seed: int, rng: np.random.Generator, worlds: str = "usual") -> tup
     if worlds == "logs":
         kind = list(logs.TURNS)[seed % len(logs.TURNS)]
         return kind, list(logs.TURNS[kind])
+    if worlds == "pairs":
+        return "two", [names[seed % len(names)] for names in (pairs.COMMAND, pairs.FRICTION)]
+    if worlds == "twins":
+        return "named", [list(pairs.TWINS)[seed % len(pairs.TWINS)]]
     kind = CYCLE[seed % len(CYCLE)]
     turn = seed // len(CYCLE) * CYCLE.count(kind) + CYCLE[: seed % len(CYCLE)].count(kind)
     if kind == "none":
@@ -154,9 +161,16 @@ def draw(
         world, bench, poor = WORLDS[worlds](rng, chosen, seconds, kind)
         floor = float(np.hypot(bench.noise, bench.resolution / np.sqrt(12)))
         effects = []
-        place = int(rng.integers(len(world.rig.actuated))) if worlds == "logs" else None
-        for name in (one for one in chosen if one not in logs.LOG_FAULTS):
+        n = len(world.rig.actuated)
+        places: list[int | None] = [int(rng.integers(n)) if worlds == "logs" else None] * len(chosen)
+        if worlds == "pairs":
+            places = rng.permutation(n)[: len(chosen)].tolist()
+        for name, place in zip(chosen, places, strict=True):
+            if name in logs.LOG_FAULTS:
+                continue
             world, truth = hide(world, name, rng, strength if attempt == 0 else 1.0, seed, floor, place)
+            if worlds == "twins":
+                truth["twins"] = list(pairs.TWINS[name])
             effects.append(truth)
         weakest = min((e["signal"] if e["absorbed"] else e["distinct"] for e in effects), default=np.inf)
         reached = np.abs(probe(world, seed)[0]).max()

@@ -1,6 +1,7 @@
 """Worlds of the blind rounds: the usual ones stay, machines of any size are sane, forms differ and have limits."""
 
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ import polars as pl
 import pytest
 import yaml
 
-from benchmarks.blind import forms, generator, hidden, logs, sizes, worlds
+from benchmarks.blind import forms, generator, hidden, logs, pairs, sizes, worlds
 from benchmarks.blind import plant as at
 from benchmarks.blind.dynamics import mass_and_bias
 from benchmarks.blind.excitation import multisine, ramps
@@ -98,6 +99,28 @@ def test_a_hidden_effect_is_as_large_as_its_machine() -> None:
         assert truth["parameters"]["velocity"] < 400.0 / world.time_unit * speeds.max()
         torque = np.abs(generator.probe(world, 0)[1][:, joint])
         assert 0.05 * torque.max() < changed.plant.stribeck[joint] < torque.max()
+
+
+def test_a_pair_acts_on_two_joints_and_every_command_meets_every_friction() -> None:
+    rng = np.random.default_rng(0)
+    drawn = {tuple(generator.names_for(seed, rng, "pairs")[1]) for seed in range(30)}
+    assert drawn == set(product(pairs.COMMAND, pairs.FRICTION))
+    effects = generator.draw(3, worlds="pairs")[2]["effects"]
+    assert [one["name"] for one in effects] == ["actuator_lag", "friction_drift"]
+    assert effects[0]["joints"] != effects[1]["joints"]
+
+
+def test_a_tilted_mount_moves_an_arm_of_one_joint_as_a_wrong_zero_does() -> None:
+    world = generator.draw(2, worlds="twins")[0]
+    assert len(world.rig.actuated) == 1
+    plain, turned = worlds.copy(world), worlds.copy(world)
+    x, _, z = world.rig.gravity
+    plain.rig.felt, angle = None, 0.05
+    turned.rig.felt = (np.cos(angle) * x + np.sin(angle) * z, 0.0, np.cos(angle) * z - np.sin(angle) * x)
+    plain.rig.gravity = (x, 0.0, z)
+    plain.plant.offset[0] += angle
+    tilted, shifted = (generator.probe(one, 0)[0] for one in (turned, plain))
+    assert np.abs(tilted - shifted).max() < 1e-3 * np.abs(tilted).max()
 
 
 def _replay(**values: float) -> np.ndarray:

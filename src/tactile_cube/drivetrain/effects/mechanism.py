@@ -1,5 +1,8 @@
 """Links and rotors that are not as described."""
 
+from collections.abc import Mapping
+from typing import ClassVar
+
 import numpy as np
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Place, Scales, Stage, View
@@ -96,6 +99,8 @@ class MountTilt(Effect):
         Parameter("second", "1", 0.0, -0.6, 0.6, 0.1, "1-15 deg, in rad"),
     )
     forms = ({"second": 0.1}, {"first": 0.1}, {"first": 0.1, "second": 0.1})
+    details = ("first", "second")
+    detail_starts: ClassVar[Mapping[str, float]] = {"first": 0.1, "second": 0.1}  # a joint feels one as its cosine only
 
     @classmethod
     def can_act(cls, scales: Scales) -> bool:

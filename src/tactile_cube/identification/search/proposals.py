@@ -125,7 +125,8 @@ def key(candidate: Candidate) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
 def grown(search: Search, looks: Looks) -> list[Proposal]:
     """Return refitted sets that extend the parent, cheapest first.
 
-    Once a set is at the noise floor, only laws whose own fit came close to it are refitted too.
+    Once a set is at the noise floor, only laws whose own fit came close to it are refitted too, and simpler ones: a
+    table follows the fitted trials whatever is behind them.
     """
     by_name: dict[tuple[str, tuple[str, ...]], Tried] = {}
     for candidate, fitted in looks.tried:
@@ -133,7 +134,8 @@ def grown(search: Search, looks: Looks) -> list[Proposal]:
         by_name[name] = (*by_name.get(name, ()), (candidate, fitted))
     found: list[Proposal] = []
     for forms in list(by_name.values())[:SINGLES]:
-        if not whole(search, found) or near(looks, forms[0][1].cost, found):
+        as_simple = [one for one in found if one.effects[-1].size <= forms[0][0].size]
+        if not whole(search, as_simple) or near(looks, forms[0][1].cost, found):
             found += in_its_forms(search, looks, forms)
     if not whole(search, found):
         found += [refitted(search, looks, laws) for laws in sets(looks, search.criteria) if not search.spent]
