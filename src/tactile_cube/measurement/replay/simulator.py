@@ -33,7 +33,6 @@ from tactile_cube.measurement.replay.windows import SMOOTHING, START_SPEED, Wind
 
 CLAMPED = 1e9  # [N m] brake torque of a clamped link
 DRIVE = ("kp", "kd", "stiffness", "static_friction", "reflected_inertia", "torque_limit")
-SEEN_IN = 0.2  # rows in which a log comes to see a jump of the command; a step would stop a fit that begins there
 MECHANICS = (*TREE_KEYS, "gravity")  # what the equations of motion of a path depend on, but for rotors
 
 
@@ -177,15 +176,12 @@ class Simulator:
         follows: bool = True,
     ) -> None:
         memory = self._memories(model, windows)
-        ratios = self._jump_ratios(memory, windows)
-        if np.any(model.constants.get("reading_delay", 0.0)):
-            windows = self._begun(model, windows, ratios[0])
-            memory = self._memories(model, windows)
         paths = np.zeros((len(windows), 1))
         if near is not None and (not follows or np.array_equal(near.mechanics, self._mechanics(memory[0]))):
             paths = near.steps
             self.plant.view(memory, "follows" if follows else "needs_weight")[:] = 1.0
         gap = read_out.gaps(self.plant, memory[0])
+        ratios = self._jump_ratios(memory, windows)
         limit = self.plant.view(memory, "torque_limit")[:, None].copy()
         rows = np.array([MOTOR_POSITION, TORQUE, COMMAND, POSITION, *([LEAD, LOOP_GAIN] if gap.any() else [])])
         joints = len(self.recording.joints)
@@ -202,36 +198,19 @@ class Simulator:
             far &= known[:, None]
             position, torque = np.where(far, before[:, :, 0], position), np.where(far, before[:, :, 1], torque)
         links = shown[:, :, 3, windows.joint_of[joints:]]
-        jumped = np.concatenate([2.0 * (shown[:, :, 0] - position), np.zeros_like(links)], axis=2)
-        out[0] = self._as_read(np.concatenate([position, links], axis=2), jumped, model, windows)
+        out[0] = self._as_read(np.concatenate([position, links], axis=2), model, windows)
         out[1:, ..., :joints] = torque
         if links.size:
             _zero_links(out[0], windows, joints)
 
-    def _begun(self, model: Model, windows: Windows, ratio: Array) -> Windows:
-        """Return the windows with their segments' starts where the joints were as old as the log reads them."""
-        delay = model.constants["reading_delay"]
-        jumped = 2.0 * ratio * windows.jump[:, :: windows.segment]
-        seen = np.clip(-delay / (SEEN_IN * self.recording.step), 0.0, 1.0)
-        return replace(windows, position=windows.position + delay * windows.speed - seen * jumped)
-
-    def _as_read(self, position: Array, jumped: Array, model: Model, windows: Windows) -> Array:
-        """Return the positions (S, K segment, M) as old as the log reads them, by the parabola through three rows.
-
-        At a jump of the command a motor has `jumped` (S, K segment, M) [rad] at once; a log that reads before it sees
-        nothing of that, one that reads `SEEN_IN` after it all.
-        """
-        if not np.any(delay := model.constants.get("reading_delay", 0.0)):
+    def _as_read(self, position: Array, model: Model, windows: Windows) -> Array:
+        """Return the positions (S, K segment, M) as old as the log reads them."""
+        delay = model.constants.get("reading_delay", np.zeros(1))
+        if not delay.any():
             return position
-        rows = np.asarray(delay)[windows.joint_of] / self.recording.step
-        shape = len(windows), windows.segments, windows.segment, -1
-        at, jump = position.reshape(shape), jumped.reshape(shape)
-        onward = np.diff(at, axis=2) - jump[:, :, :-1]
-        bent = np.diff(onward, axis=2, prepend=2.0 * onward[:, :, :1] - onward[:, :, 1:2])
-        bent = np.concatenate([bent, bent[:, :, -1:]], axis=2)
-        ahead = np.concatenate([onward, onward[:, :, -1:] + bent[:, :, -1:]], axis=2)
-        moved = rows * (0.5 * (1.0 + rows) * bent - ahead)
-        return np.asarray((at + moved + np.clip(-rows / SEEN_IN, 0.0, 1.0) * jump).reshape(position.shape))
+        parts = position.reshape(len(windows), windows.segments, windows.segment, -1)
+        speed = np.gradient(parts, self.recording.step, axis=2).reshape(position.shape)
+        return np.asarray(position - delay * speed)
 
     def _play(
         self,
