@@ -36,13 +36,17 @@ DECIDING = ("floor", "adequate", "least_gain", "detail", "band", "significant", 
 
 
 def missed(criteria: Criteria) -> list[tuple[str, float]]:
-    """Draws and strengths that are answered otherwise than by what is hidden, or by nothing where it does not show."""
+    """Draws and strengths that are answered otherwise than by what is hidden, or by nothing where it does not show.
+
+    What is weaker than it was may be named beside more that these data cannot tell from it.
+    """
     found = []
     for seed, table in EVIDENCE.items():
         for strength in STRENGTHS:
             kind, named, error = decided(table["evidence"], criteria, strength)
-            known = (table["verdict"], table["named"]) if error > SHOWS else ADEQUATE
-            found += [(seed, strength)] if (kind, named) != known else []
+            verdict, sets = (table["verdict"], table["named"]) if error > SHOWS else ADEQUATE
+            others = [one for one in named if one not in sets] if strength < 1.0 else []
+            found += [(seed, strength)] if (kind, named) != (verdict, [*sets, *others]) else []
     return found
 
 

@@ -58,7 +58,7 @@ def decide(findings: Findings, criteria: Criteria = STANDARD) -> Verdict:
     chosen = simplest(plausible or possible, criteria) if possible else base
     if not nameable(chosen, base, criteria):
         return Verdict("unknown_effect", closest(likely if plausible else found, findings, criteria))
-    rivals = find_rivals(chosen, plausible or possible, criteria)
+    rivals = find_rivals(chosen, possible, criteria)
     if not plausible or not complete(chosen, base, criteria) or lacks_a_law(chosen, found, criteria):
         return Verdict("partly_explained", chosen, rivals)
     return Verdict("ambiguous" if rivals else "missing_effect", chosen, rivals)
