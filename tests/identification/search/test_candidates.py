@@ -55,13 +55,22 @@ def test_a_single_number_starts_as_large_as_the_first_look_says() -> None:
     assert resized(SCORE).form["delay"] == pytest.approx(0.015)
 
 
+def test_a_law_of_either_sign_starts_with_the_one_of_the_first_look() -> None:
+    lighter = Candidate(find_effect("payload"), ("q1",), {"mass": -0.02, "distance": 0.03})
+    heavier = replace(lighter, form={"mass": 0.5, "distance": 0.3})
+    scores = [Score(lighter, 1.0, -0.9), Score(heavier, 0.99, 0.08)]
+    assert start(scores) is scores[0]
+    assert resized(scores[0]).form == pytest.approx({"mass": 0.018, "distance": 0.03})
+
+
 @pytest.mark.parametrize(
     "score",
     [
         replace(SCORE, factor=50.0),
+        replace(SCORE, factor=-0.9),
         replace(SCORE, candidate=Candidate(find_effect("torque_saturation"), ("q1",), {"limit": 0.1})),
     ],
-    ids=["not believed", "a limit is no size"],
+    ids=["not believed", "of one sign only", "a limit is no size"],
 )
 def test_other_starts_stay(score: Score) -> None:
     assert resized(score) is score.candidate

@@ -16,10 +16,10 @@ from tactile_cube.measurement.split import held_out_split
 from tests.identification.rigs_of_any_size import NOISE, Size, simulated
 
 
-def searched(folder: Path, values: dict[str, float]) -> Search:
-    """A search that knows a tilted mount and a table of torques, in a mount tilted by `values`."""
-    recording = simulated(folder, Size(), find_effect("mount_tilt"), values)
-    effects = tuple(find_effect(name) for name in ("mount_tilt", "position_torque"))
+def searched(folder: Path, values: dict[str, float], names: tuple[str, ...] = ("mount_tilt",)) -> Search:
+    """A search that knows these effects, of which the first one is hidden with `values`, and a table of torques."""
+    recording = simulated(folder, Size(), find_effect(names[0]), values)
+    effects = tuple(find_effect(name) for name in (*names, "position_torque"))
     return Search(*held_out_split(recording), np.full(1, NOISE), effects, lambda line: None)
 
 
@@ -39,3 +39,10 @@ def test_a_simpler_law_is_refitted_beside_a_table_at_the_noise_floor(tmp_path: P
     (alone,) = (one for one in found if named_by(one.effects) == {("position_torque", "a")} and whole(search, [one]))
     assert not near(looks, unmoved[1].cost, [alone])
     assert {("mount_tilt", "a")} in [named_by(one.effects) for one in found if whole(search, [one])]
+
+
+def test_a_table_that_is_worse_is_tried_as_the_spring_that_it_contains(tmp_path: Path) -> None:
+    verdict = decide(find(searched(tmp_path, {"error": -0.1}, ("torque_gain", "payload"))))
+    assert named_by(verdict.chosen.effects) == {("torque_gain", "a")}
+    names = {frozenset(one.effects[-1].form) for one in verdict.rivals}
+    assert names == {frozenset({"mass", "distance"}), frozenset({"stiffness", "bias"})}

@@ -219,19 +219,32 @@ def start(same: Sequence[Score]) -> Score:
     """
     return min(
         (score for score in same if score.gain >= AS_GOOD * same[0].gain),
-        key=lambda score: abs(math.log(score.factor)) if score.factor > 0.0 else math.inf,
+        key=lambda score: abs(math.log(abs(factor))) if (factor := believed(score)) else math.inf,
     )
 
 
-def resized(score: Score) -> Candidate:
-    """Return the candidate with its start scaled to the screening's estimate, if one parameter sets the size.
+def believed(score: Score) -> float:
+    """Return what the first look multiplies a start with, within the law's bounds; 0 against its sign.
 
-    Other parameters may set a position or a speed: their neutral value is not zero.
+    Only a law whose size is one parameter may have its sign changed.
     """
-    (name, start), *more = score.candidate.form.items()
-    parameters = score.candidate.parameters(score.candidate.joints[0])
-    known, sizes = parameters[name], [n for n, _ in more if parameters[n].neutral == 0.0]
-    if sizes or known.neutral != 0.0 or not RESIZED[0] < score.factor < RESIZED[1]:
+    if (name := size_of(score.candidate)) is None:
+        return max(score.factor, 0.0)
+    begun, known = score.candidate.form[name], score.candidate.parameters(score.candidate.joints[0])[name]
+    return min(max(score.factor * begun, known.low), known.high) / begun
+
+
+def size_of(candidate: Candidate) -> str | None:
+    """Return the one parameter that sets a law's size; others may set a position or a speed, neutral at no zero."""
+    parameters, (name, *more) = candidate.parameters(candidate.joints[0]), candidate.form
+    alone = parameters[name].neutral == 0.0 and all(parameters[one].neutral != 0.0 for one in more)
+    return name if alone else None
+
+
+def resized(score: Score) -> Candidate:
+    """Return the candidate with its start scaled to the screening's estimate, if one parameter sets the size."""
+    name, factor = size_of(score.candidate), believed(score)
+    if name is None or not RESIZED[0] < abs(factor) < RESIZED[1]:
         return score.candidate
-    size = min(max(score.factor * start, known.low), known.high)
-    return replace(score.candidate, form={**score.candidate.form, name: size})
+    form = score.candidate.form
+    return replace(score.candidate, form={**form, name: factor * form[name]})

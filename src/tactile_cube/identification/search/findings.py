@@ -224,9 +224,10 @@ def twins(search: Search, chosen: Explanation, first: Looks, judged: Sequence[Ex
     """Return sets in which another law replaces a chosen one and fits as well after a full refit.
 
     Special cases of the chosen law come first and are always tried if its interval reaches the value at which it
-    becomes them, as is the set without the effect. A law with many more parameters is not tried.
+    becomes them, as is the set without the effect. A law with many more parameters is not tried; what was judged with
+    many more is tried with fewer.
     """
-    known = {named_by(one.effects) for one in judged}
+    known = {named_by(one.effects) for one in judged if one.size <= chosen.size + 1}
     found: list[Proposal] = []
     for places in together(chosen.effects):
         replaced, looks = [chosen.effects[place] for place in places], first
