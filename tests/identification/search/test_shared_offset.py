@@ -1,14 +1,21 @@
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import yaml
 
-from tactile_cube.drivetrain.effects import catalogue
+from tactile_cube.drivetrain.effects import catalogue, find_effect
 from tactile_cube.drivetrain.effects.effect import FINGER
-from tactile_cube.identification.search.explanation import Explanation
-from tactile_cube.identification.search.findings import common_offsets, shared_offset
+from tactile_cube.identification.search.explanation import Explanation, named_by
+from tactile_cube.identification.search.findings import common_offsets, find, shared_offset
+from tactile_cube.identification.search.search import Search
+from tactile_cube.identification.verdict import decide
+from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.replay.model import Model
+from tactile_cube.measurement.split import held_out_split
+from tests.identification.rigs_of_any_size import NOISE, Size, simulated
 from tests.identification.test_verdict import FIT, judged
 
 SIZES = {"q1": FINGER, "q2": FINGER}
@@ -50,3 +57,19 @@ def test_three_initialisations_tell_by_what_the_offsets_of_all_joints_scatter(sc
 
 def test_one_initialisation_tells_nothing() -> None:
     assert common_offsets(base([-0.08, 0.01]), SIZES) == ()
+
+
+def test_an_offset_of_the_first_joint_may_as_well_be_a_mount_that_leans(tmp_path: Path) -> None:
+    offset = find_effect("position_offset")
+    folder = simulated(tmp_path, Size(), offset, {"offset": 0.04}, repeats=4).folder
+    described = yaml.safe_load((folder / "recording.yaml").read_text())
+    for k, trial in enumerate(described["trials"]):
+        trial["initialisation"] = k // 2
+    (folder / "recording.yaml").write_text(yaml.safe_dump(described))
+    effects = (offset, *(find_effect(name) for name in ("mount_tilt", "payload", "torque_bias", "coulomb_friction")))
+    search = Search(*held_out_split(read_recording(folder)), np.full(1, NOISE), effects, lambda line: None)
+    verdict = decide(find(search))
+    assert named_by(verdict.chosen.effects) == {("position_offset", "a")}
+    assert [named_by(one.effects) for one in verdict.rivals] == [{("mount_tilt", "a")}]
+    (leaning,) = (one.fit.model.terms[-1].values for one in verdict.rivals)
+    assert max(abs(value) for value in leaning.values()) == pytest.approx(0.04, abs=0.005)

@@ -69,8 +69,8 @@ class CommandDeadZone(Effect):
         return x[sig.TORQUE, j] - min(max(x[sig.TORQUE, j], -p[4]), p[4])
 
 
-RATES = (0.8, 0.4, 0.15)
-"""Limits at which a search starts, as parts of the fastest motion, or of the fastest command where that is slower."""
+RATES = (3.0, 0.8, 0.4, 0.15)
+"""Limits at which a search starts, in units of the usual fastest motion, or command where that is slower."""
 
 
 class RateLimit(Effect):
@@ -93,7 +93,7 @@ class RateLimit(Effect):
 
     @classmethod
     def starts_at(cls, scales: Scales) -> list[dict[str, float]]:
-        """Return limits below the fastest motion, which follows a limited command; steps are faster than any limit."""
+        """Return limits below the usual fastest motion, which follows a limited command, and one that binds in steps."""
         fastest = min(scales.speed, scales.command_speed)
         return [{"speed": share * fastest} for share in RATES]
 

@@ -11,7 +11,7 @@ from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.fitting.resolution import NORMAL_95, standard_errors
 from tactile_cube.identification.search.candidates import Candidate, Score, Sizes, first_term
-from tactile_cube.identification.search.evidence import Judgement, worse
+from tactile_cube.identification.search.evidence import Judgement, as_good, worse
 from tactile_cube.identification.search.explanation import (
     Explanation,
     Proposal,
@@ -109,7 +109,7 @@ def find(search: Search, standard: Proposal | None = None) -> Findings:
     search.say(f"base refitted: held-out error {base.error:.2f} x sensor noise")
     if base.largest_error <= search.criteria.floor:
         shared = shared_offset(base, search.fitted, search.effects, search.shooting.sizes)
-        return Findings(base, nominal, (shared,) if shared else ())
+        return Findings(base, nominal, (shared, *in_place_of(search, shared)) if shared else ())
     search.stand(f"constants refitted ({base.error:.2f} x sensor noise on held-out trials)", "every law by itself")
     way, first = proposed(search, standard)
     looked = max(first.laws, 1) if first else 1
@@ -336,6 +336,25 @@ def shared_offset(
     candidate = Candidate(effect, joints, {name: float(np.abs(mean[shared]).max())}, sizes)
     fit = replace(base.fit, model=model)
     return replace(base, effects=(*base.effects, candidate), fit=fit, p_value=float(by_chance[shared].max()), gain=1.0)
+
+
+def in_place_of(search: Search, shared: Explanation) -> list[Explanation]:
+    """Return the base model with another law that leaves no shared offset: a mount that leans, where weight is all.
+
+    They predict the same motion, so each is as certain as the `shared` offset of an encoder.
+    """
+    base, first = search.base, len(search.base.fit.model.terms)
+    model = replace(shared.fit.model, terms=shared.fit.model.terms[:first])
+    unknowns = tuple(u for u in base.fit.unknowns if u.kind != "offset")
+    parent = Proposal(base.effects, replace(base.fit, model=model, unknowns=unknowns))
+    looks = look(search, parent, shared.effects[-1].joints)
+    others = [search.explained(one, looks.laws) for one in twins(search, shared, looks, [shared])]
+    return [
+        replace(one, judgement=base.judgement, p_value=shared.p_value, gain=shared.gain)
+        for one in others
+        if as_good(one.judgement, base.judgement, search.criteria)
+        and shared_offset(one, search.fitted, search.effects, search.shooting.sizes) is None
+    ]
 
 
 def common_offsets(base: Explanation, sizes: Sizes) -> tuple[CommonOffset, ...]:
