@@ -93,7 +93,7 @@ class RateLimit(Effect):
 
     @classmethod
     def starts_at(cls, scales: Scales) -> list[dict[str, float]]:
-        """Return limits below the usual fastest motion, as it follows a limited command, and one that binds in steps."""
+        """Return limits below the usual fastest motion, which follows limited commands, and one that binds in jumps."""
         fastest = min(scales.speed, scales.command_speed)
         return [{"speed": share * fastest} for share in RATES]
 
