@@ -13,10 +13,22 @@ import tactile_cube
 from tactile_cube.composition import commands
 
 
-def test_importing_the_package_imports_nothing_slow() -> None:
-    code = "import sys, tactile_cube; print(*sys.modules)"
+@pytest.mark.parametrize(
+    ("names", "slow"),
+    [
+        ("tactile_cube", {"torch", "torchrl", "hydra", "omegaconf", "pybullet", "numba"}),
+        (
+            "tactile_cube.api.diagnosis, tactile_cube.visualization.diagnosis_report,"
+            " tactile_cube.visualization.comparison_episode",
+            {"torch", "torchrl", "tensordict", "mujoco"},
+        ),
+    ],
+    ids=["the package", "a diagnosis and its report"],
+)
+def test_importing_imports_nothing_slow(names: str, slow: set[str]) -> None:
+    code = f"import sys, {names}; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
-    assert not set(loaded) & {"torch", "torchrl", "hydra", "omegaconf", "pybullet", "numba"}
+    assert not set(loaded) & slow
 
 
 @pytest.mark.parametrize("name", tactile_cube.__all__)

@@ -1,10 +1,12 @@
 """Charts of the reports, and figures of a comparison: Matplotlib draws them as SVG text that needs nothing else."""
 
+from __future__ import annotations
+
 import re
 from collections.abc import Mapping, Sequence
 from io import BytesIO, StringIO
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import matplotlib
 import numpy as np
@@ -12,11 +14,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from tactile_cube.evaluation.evaluation import VariantResult
 from tactile_cube.evaluation.training_curve import ANGLE, CURRICULUM, REGRASPING, STEPS, Curve
 from tactile_cube.measurement.comparing.comparison import Comparison
 from tactile_cube.measurement.units import SMALL, shown
 from tactile_cube.whole_file import write_whole
+
+if TYPE_CHECKING:  # a report of a measurement waits for no learning library
+    from tactile_cube.evaluation.evaluation import VariantResult
 
 Array = NDArray[np.float64]
 
