@@ -21,7 +21,7 @@ SMALL = {
     "update": partial(update, 1, peers=False, calls=1, hidden=16),
     "end_to_end": partial(end_to_end, 1, peers=False, worlds=2, steps=3, updates=1, hidden=16),
     "identification": partial(
-        identification, 1, peers=False, duration=1.0, kinds=1, session=2.0, hidden=[()], bench=ONE_JOINT
+        identification, 1, peers=False, duration=1.0, kinds=1, session=2.0, hidden=[], bench=ONE_JOINT
     ),
     "startup": partial(startup, 1, commands=("--help",), trains=False),
 }

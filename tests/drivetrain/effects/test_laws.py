@@ -30,6 +30,7 @@ from tactile_cube.drivetrain.effects import (
 )
 from tactile_cube.drivetrain.effects.command import RateLimit
 from tactile_cube.drivetrain.effects.effect import FINGER, Scales, unit_at
+from tactile_cube.drivetrain.effects.joint_torque import JointStop
 from tactile_cube.drivetrain.effects.mechanism import Payload
 from tactile_cube.drivetrain.effects.transmission import Elasticity, StiffeningElasticity
 from tactile_cube.drivetrain.signals import DAMPING, GAP, INERTIA, LOOP_GAIN, LOOSE_TORQUE, ROWS, SENSOR_VELOCITY
@@ -537,6 +538,11 @@ def test_a_rate_limit_starts_about_the_fastest_motion_where_steps_are_faster() -
     assert speeds == pytest.approx([15.0, 4.0, 2.0, 0.75])
     slow = RateLimit.starts_at(replace(FINGER, speed=5.0, command_speed=2.0))
     assert slow[1]["speed"] == pytest.approx(1.6), "of noise"
+
+
+def test_a_stop_lies_in_its_half_of_the_motion() -> None:
+    known = JointStop.parameters_at(replace(FINGER, low=-0.2, high=1.0))
+    assert (known["upper"].low, known["lower"].high) == pytest.approx((0.4, 0.4))
 
 
 def test_a_search_begins_with_little_mass_and_with_that_of_a_counterweight_and_a_tool() -> None:

@@ -1,5 +1,6 @@
 """Torques on the joint that depend smoothly on its motion."""
 
+from dataclasses import replace
 from math import isfinite, tanh
 from typing import ClassVar
 
@@ -212,6 +213,13 @@ class JointStop(Effect):
             return None
         ends = f" of {scales.lower:.3g} to {scales.upper:.3g}" if isfinite(scales.upper - scales.lower) else ""
         return f"moved from {scales.low:.3g} to {scales.high:.3g}{ends} {unit_at('rad', scales.slides)}"
+
+    @classmethod
+    def parameters_at(cls, scales: Scales) -> dict[str, Parameter]:
+        """Return the parameters; a stop lies in its half of the motion, for beyond the middle it would be a spring."""
+        known, middle = super().parameters_at(scales), 0.5 * (scales.low + scales.high)
+        upper, lower = replace(known["upper"], low=middle), replace(known["lower"], high=middle)
+        return known | {"upper": upper, "lower": lower}
 
     @classmethod
     def placed_at(cls, scales: Scales) -> dict[str, float]:
