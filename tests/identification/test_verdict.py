@@ -56,6 +56,15 @@ def test_a_number_that_a_fit_chooses_where_a_trial_begins_counts_as_one() -> Non
     assert (verdict.kind, verdict.chosen) == ("missing_effect", bias)
 
 
+@pytest.mark.parametrize(("error", "known"), [(1.03, True), (1.1, False)])
+def test_what_is_as_good_as_a_proven_set_is_its_rival_without_a_proof_of_its_own(error: float, known: bool) -> None:
+    offset = explanation("position_offset", 1.02, 1.5)
+    tilt = replace(explanation("mount_tilt", error, 1.5, 1), p_value=0.05)
+    verdict = decide(findings(1.5, offset, tilt))
+    assert verdict.chosen is offset
+    assert (verdict.rivals == (tilt,)) is known
+
+
 def test_where_nothing_is_named_the_model_that_predicts_best_is_recommended() -> None:
     plain = explanation("backlash", 10.2)
     best = replace(explanation("payload", 10.0), effects=(*plain.effects, *explanation("payload", 10.0).effects))

@@ -71,8 +71,8 @@ class Findings:
     def proven(self, criteria: Criteria = STANDARD) -> list[Explanation]:
         """Return the significant sets, best first; only a shared offset if the base model is at the noise floor.
 
-        Once one set proves that something is missing, a better set with as few effects counts as significant too: its
-        own p-value may be high only because it was compared over few blocks.
+        Once one set proves that something is missing, a set as good as the best one with as few effects counts as
+        significant too: its own p-value may be high only because it was compared over few blocks.
         """
         found = [one for one in self.judged if proven(one, criteria)]
         if self.base.largest_error <= criteria.floor:
@@ -83,7 +83,7 @@ class Findings:
                 one
                 for one in self.judged
                 if not proven(one, criteria)
-                and one.judgement.costs.sum() < best.judgement.costs.sum()
+                and as_good(one.judgement, best.judgement, criteria)
                 and len(named_by(one.effects)) <= len(named_by(best.effects))
             ]
         return sorted(found, key=lambda one: one.judgement.costs.sum())
