@@ -37,6 +37,29 @@ def test_windows_that_begin_later_know_what_the_integral_has_come_to(values: dic
     assert problem.chosen_numbers(true).sum() == len(recording.trials), "one number was chosen for each trial"
 
 
+@pytest.mark.parametrize(("limit", "damping", "carried"), [(0.3, 0.9, 0.0), (0.5, 1.0, 5.0)])
+def test_no_wind_up_is_taken_that_fits_worse(limit: float, damping: float, carried: float, tmp_path: Path) -> None:
+    values = {"ki": 2.0, "limit": limit}
+    recording = simulated(tmp_path, Size(), INTEGRAL, values)
+    shooting = Shooting(recording, EFFECTS)
+    problem = Problem(shooting, shooting.cut(recording, np.array([NOISE])))
+    plain = nominal_model(recording)
+    constants = {**plain.constants, "kd": damping * plain.constants["kd"]}
+    model = Model(constants, (Term(INTEGRAL, "a", values, ()),), plain.offsets)
+
+    def costs() -> list[float]:
+        each = problem.cost(problem.residual(problem.prediction(model)))
+        return [each[problem.segment_trial == trial].sum() for trial in range(len(recording.trials))]
+
+    problem.linearise_starts(model)
+    problem.windows = replace(problem.windows, wound=np.zeros_like(problem.windows.wound))
+    balanced = costs()
+    problem.windows = replace(problem.windows, wound=problem.windows.wound + carried)
+    problem.linearise_starts(model)
+    for after, before in zip(costs(), balanced, strict=True):
+        assert after <= before * (1.0 + 1e-9), "a clamp hides what is wound up beyond it"
+
+
 @pytest.mark.parametrize("balanced", [True, False])
 def test_bristles_begin_as_the_first_segments_say(balanced: bool, tmp_path: Path) -> None:
     values = {"breakaway": 0.01, "excess": 0.1}

@@ -69,7 +69,7 @@ class CommandDeadZone(Effect):
         return x[sig.TORQUE, j] - min(max(x[sig.TORQUE, j], -p[4]), p[4])
 
 
-RATES = (3.0, 0.8, 0.4, 0.15)
+RATES = (3.0, 1.5, 0.8, 0.4, 0.15)
 """Limits at which a search starts, in units of the usual fastest motion, or command where that is slower."""
 
 

@@ -145,14 +145,14 @@ class Problem:
 
     def linearise_starts(self, model: Model) -> None:
         """Take the initial states of trials and the sensitivity to segment starts from this model from now on."""
+        if self.windows.wound.any():  # another model's
+            self.windows = replace(self.windows, wound=np.zeros_like(self.windows.wound))
         self.windows = with_initial_states(self.shooting, model, self.windows)
         self._linearise_segments(model)
         if any(t.effect is PreslidingFriction and t.values["breakaway"] > 0.0 for t in model.terms):
             self._choose_balance(model)
         for _ in range(REWOUND if (joints := self.shooting.integrating(model)) else 0):
-            wound = self.windows.wound.copy()
-            wound[:, joints] += self._more_wound(model, joints)
-            self.windows = replace(self.windows, wound=wound)
+            self._take_wound(model, self._more_wound(model, joints))
 
     def _choose_balance(self, model: Model) -> None:
         """Begin each trial with its bristles balanced or unbent, as its first segment says."""
@@ -166,8 +166,17 @@ class Problem:
             self.windows = replace(self.windows, balanced=self.windows.balanced ^ wrong[:, None])
             self._linearise_segments(model)
 
+    def _take_wound(self, model: Model, wound: Array) -> None:
+        """Take other wind-ups (S, n) [N m] in the trials that they fit better; beyond a clamp they only do harm."""
+        before, windows = self.cost(self.residual(self.prediction(model))), self.windows
+        self.windows = replace(windows, wound=wound)
+        change = self.cost(self.residual(self.prediction(model))) - before
+        better = [trial for trial in np.unique(windows.trial) if change[self.segment_trial == trial].sum() < 0.0]
+        wound = np.where(np.isin(windows.trial, better)[:, None], wound, windows.wound)
+        self.windows = replace(windows, wound=wound)
+
     def _more_wound(self, model: Model, joints: list[int]) -> Array:
-        """Estimate the missing wind-up (S, joints) of integrals at each trial's start, which no log shows [N m]."""
+        """Return the integrals' wind-up (S, n) as trials begin, which no log shows, after a Gauss-Newton step [N m]."""
         prior = WOUND * self.shooting.per_joint("N m")[joints]
         moved = [
             self.windows.wound + prior[k] * STEP * np.eye(self.windows.wound.shape[1])[j] for k, j in enumerate(joints)
@@ -177,13 +186,14 @@ class Problem:
         left = self.free(self.residual(base))
         columns = np.stack([self.limited(other - base) / STEP * self.weight for other in others], axis=-1)
         freed = self.free(columns)
-        more = np.zeros((len(self.windows), len(joints)))
+        wound = self.windows.wound.copy()
         for trial in np.unique(self.windows.trial):
             own = self.segment_trial == trial
             part = columns[own].reshape(-1, len(joints))
             gram = part.T @ freed[own].reshape(part.shape) + np.eye(len(joints))
-            more[self.windows.trial == trial] = prior * np.linalg.solve(gram, part.T @ left[own].ravel())
-        return more
+            more = prior * np.linalg.solve(gram, part.T @ left[own].ravel())
+            wound[np.ix_(self.windows.trial == trial, joints)] += more
+        return wound
 
     def _linearise_segments(self, model: Model) -> None:
         raw = self.shooting.start_sensitivity(model, self.windows, self.path(model))
