@@ -104,3 +104,23 @@ def test_where_both_leave_something_the_standard_model_stands_unless_a_richer_on
     assert (verdict.kind, verdict.chosen.effects) == ("unknown_effect", standard.effects)
     whole = Verdict("missing_effect", chosen)
     assert no_worse(whole, standard, search, simulations, search.free_runs) == whole
+
+
+def test_what_whole_trials_and_segments_prefer_of_two_complete_models_cannot_be_told_apart(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    payload = find_effect("payload")
+    recording = simulated(tmp_path, Size(), payload, {"mass": 0.02, "distance": 0.1})
+    noise, parts = np.full(1, NOISE), held_out_split(recording)
+    hidden = Candidate(payload, tuple(recording.joints), {"mass": 0.02, "distance": 0.1})
+    search = Search(*parts, noise, (payload,), lambda line: None)
+    standard = fit_standard_model(*parts, noise, effects=(payload,))
+    assert [one.effect.name for one in standard.effects] == ["torque_gain"]
+    simulations = Simulations(search, search.base, noise_floor(recording))
+    model, _ = hidden.added_to(search.start)
+    fitted = fit(search.problem, model, search.unknowns(model), iterations=0)
+    other = Explanation((hidden,), fitted, search.judged(model), 0.0, 0.9)
+    monkeypatch.setattr(search.free_runs, "worse", lambda *compared: True)
+    verdict = no_worse(Verdict("missing_effect", other), standard, search, simulations, search.free_runs)
+    assert (verdict.kind, verdict.chosen.effects) == ("ambiguous", standard.effects)
+    assert verdict.rivals == (other,)

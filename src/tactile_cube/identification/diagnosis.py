@@ -19,9 +19,9 @@ from tactile_cube.identification.fitting.resolution import Fitted, needless, res
 from tactile_cube.identification.next_experiment import Experiment, next_experiment
 from tactile_cube.identification.search.candidates import first_term
 from tactile_cube.identification.search.evidence import HeldOut, as_good, gain, judge
-from tactile_cube.identification.search.explanation import Explanation, Proposal, named_by
+from tactile_cube.identification.search.explanation import Explanation, Proposal, complete, named_by
 from tactile_cube.identification.search.findings import CommonOffset, Findings, common_offsets, find, reached
-from tactile_cube.identification.search.proposals import MORE_STEPS, stepped, without
+from tactile_cube.identification.search.proposals import MORE_STEPS, refit, stepped, without
 from tactile_cube.identification.search.search import BestSoFar, Search
 from tactile_cube.identification.standard_model import StandardModel, fit_standard_model
 from tactile_cube.identification.verdict import Simulations, Unexplained, Verdict, decide
@@ -320,7 +320,7 @@ def in_simpler_laws(answer: Answer, verdict: Verdict) -> Verdict:
         parent = search.frozen(left.fit)
         refitted = (stepped(search.problem, parent, one, MORE_STEPS) for one in simpler)
         best, begun = min(refitted, key=lambda one: one[1].cost)
-        tried = Proposal((*left.effects, best), search.refitted(begun.model))
+        tried = refit(search, (*left.effects, best), begun.model)
         if as_good((less := search.explained(tried, findings.looked)).judgement, chosen.judgement, search.criteria):
             verdict = instead_of(verdict, less)
     return verdict
@@ -339,7 +339,8 @@ def no_worse(
 
     A complete explanation may be worse by `criteria.detail` of the squared error, as its law may differ from the true
     one in detail. A partial one must be better by `criteria.least_gain` if it has more parameters than the standard
-    model, and may be worse by as much otherwise. A verdict of `adequate` needs no effects and is kept.
+    model, and may be worse by as much otherwise. A verdict of `adequate` needs no effects and is kept. Where both are
+    complete, segments favour what was found and whole trials the standard model: the data cannot tell them apart.
     """
     if verdict.kind == "adequate" or standard.fit is None:
         return verdict
@@ -353,7 +354,11 @@ def no_worse(
     fitted = fit(search.problem, standard.model, search.unknowns(standard.model), iterations=0)
     judged = search.judged(standard.model)
     better = gain(search.base.judgement, judged)
-    return Verdict("unknown_effect", Explanation(standard.effects, fitted, judged, 1.0, better))
+    usual = Explanation(standard.effects, fitted, judged, 1.0, better)
+    if not all(complete(one, search.base, search.criteria) for one in (usual, verdict.chosen)):
+        return Verdict("unknown_effect", usual)
+    others = (one for one in (verdict.chosen, *verdict.rivals) if named_by(one.effects) != named_by(usual.effects))
+    return Verdict("ambiguous", usual, tuple(others))
 
 
 def in_steps(recording: Recording, effects: Sequence[type[Effect]], known: ModelFile | None, say: Say) -> Recording:

@@ -1,4 +1,4 @@
-"""What is refitted: laws with all that they can say, and simpler laws beside one that follows any trial."""
+"""What is refitted, from where and how often: laws with all that they can say, and simpler laws beside a table."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from tactile_cube.drivetrain.effects import find_effect
+from tactile_cube.identification.fitting.unknowns import read_all
 from tactile_cube.identification.search.explanation import Proposal, named_by
 from tactile_cube.identification.search.findings import find
-from tactile_cube.identification.search.proposals import grown, look, near, stepped, whole
+from tactile_cube.identification.search.proposals import grown, look, near, refitted, stepped, whole, without
 from tactile_cube.identification.search.search import Search
 from tactile_cube.identification.verdict import decide
 from tactile_cube.measurement.split import held_out_split
@@ -30,7 +31,7 @@ def test_a_mount_tilted_about_both_axes_is_no_table_of_torques(tmp_path: Path) -
 
 
 def test_a_simpler_law_is_refitted_beside_a_table_at_the_noise_floor(tmp_path: Path) -> None:
-    search = searched(tmp_path, {"first": 0.2})
+    search = searched(tmp_path, {"first": 0.3})
     looks = look(search, Proposal((), search.base.fit), ["a"])
     table = next(law for law in looks.tried if law[0].effect.name == "position_torque")
     tilt = next(candidate for candidate, _ in looks.tried if candidate.effect.name == "mount_tilt")
@@ -46,3 +47,41 @@ def test_a_table_that_is_worse_is_tried_as_the_spring_that_it_contains(tmp_path:
     assert named_by(verdict.chosen.effects) == {("torque_gain", "a")}
     names = {frozenset(one.effects[-1].form) for one in verdict.rivals}
     assert names == {frozenset({"mass", "distance"}), frozenset({"stiffness", "bias"})}
+
+
+def test_a_mount_tilted_about_the_axis_that_only_takes_weight_away_is_beside_a_torque_gain(tmp_path: Path) -> None:
+    verdict = decide(find(searched(tmp_path, {"first": 0.26}, ("mount_tilt", "torque_gain"))))
+    named = {named_by(one.effects) for one in (verdict.chosen, *verdict.rivals)}
+    assert {frozenset({("mount_tilt", "a")}), frozenset({("torque_gain", "a")})} <= named
+
+
+def test_a_refit_begins_where_the_laws_own_steps_led_and_adds_what_they_move_of_the_constants(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    search = searched(tmp_path, {"error": -0.1}, ("torque_gain", "payload"))
+    looks = look(search, Proposal((), search.base.fit), ["a"])
+    begun = []
+    monkeypatch.setattr(search, "refitted", lambda model, step: begun.append(model) or search.base.fit)
+    laws = [next(law for law in looks.tried if law[0].effect.name == name) for name in ("torque_gain", "payload")]
+    refitted(search, looks, (laws[0],))
+    refitted(search, looks, tuple(laws))
+    constants = looks.frozen.unknowns
+    before, *own = (read_all(model, constants) for model in (looks.frozen.model, *(fitted.model for _, fitted in laws)))
+    assert np.abs(own[0] - before).max() > 0.0
+    alone, both = (read_all(model, constants) for model in begun)
+    assert alone == pytest.approx(own[0])
+    low, high = (np.array([getattr(one, end) for one in constants]) for end in ("low", "high"))
+    assert both == pytest.approx(np.clip(own[0] + own[1] - before, low, high))
+    assert [term.effect.name for term in begun[1].terms] == ["torque_gain", "payload"]
+
+
+def test_a_set_that_was_refitted_before_is_not_simulated_again(tmp_path: Path) -> None:
+    search = searched(tmp_path, {"error": -0.1}, ("torque_gain", "payload"))
+    looks = look(search, Proposal((), search.base.fit), ["a"])
+    laws = [next(law for law in looks.tried if law[0].effect.name == name) for name in ("torque_gain", "payload")]
+    alone, both = refitted(search, looks, (laws[0],)), refitted(search, looks, tuple(laws))
+    simulated_before = search.shooting.simulated
+    assert without(search, both, 1) is alone
+    assert search.shooting.simulated == simulated_before
+    assert named_by(without(search, both, 0).effects) == {("payload", "a")}
+    assert search.shooting.simulated > simulated_before

@@ -70,3 +70,11 @@ def test_an_error_of_the_sensor_is_found_by_what_damping_and_inertia_make_of_it(
     found, sine, cosine = peaks(moved(torque), response)[0]
     assert found == pytest.approx(harmonic, abs=0.6)
     assert np.hypot(sine, cosine) == pytest.approx(np.hypot(2e-3, 1e-3), rel=0.35)
+
+
+@pytest.mark.parametrize("harmonic", [1.5, 2.4, 3.7])
+def test_a_wave_longer_than_the_range_of_motion_has_a_start_nearby(harmonic: float) -> None:
+    """The range is 1.8 rad, of which a wave of 3.5 / rad takes all."""
+    missing = moved(lambda q, v, a: 0.02 * np.sin(harmonic * q) - 0.01 * np.cos(harmonic * q))
+    ratios = [max(found / harmonic, harmonic / found) for found, _, _ in peaks(missing)]
+    assert min(ratios) < 1.5

@@ -98,7 +98,7 @@ class MountTilt(Effect):
         Parameter("first", "1", 0.0, -0.6, 0.6, 0.1, "1-15 deg, in rad"),
         Parameter("second", "1", 0.0, -0.6, 0.6, 0.1, "1-15 deg, in rad"),
     )
-    forms = ({"second": 0.1}, {"first": 0.1}, {"first": 0.1, "second": 0.1})
+    forms = ({"second": 0.1}, {"first": 0.2}, {"first": 0.2, "second": 0.1})
     details = ("first", "second")
     detail_starts: ClassVar[Mapping[str, float]] = {"first": 0.1, "second": 0.1}  # a joint feels one as its cosine only
 

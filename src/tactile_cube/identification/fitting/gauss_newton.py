@@ -13,6 +13,7 @@ from tactile_cube.measurement.replay.model import Model
 
 DAMPING = 1e-4  # of a first step, in units of the information
 POOR = 1.0  # damping, in units of the information, from which on a fit that stops takes finer derivatives
+KEPT = 0.8  # part of what a step promised; if it gained that, the derivatives hold where it led
 CONVERGED = 2e-3  # relative gain below which a fit ends that only has to be compared with others
 SHORTER = (
     6  # shorter and shorter steps that are tried before a fit ends; each costs one simulation, derivatives cost many
@@ -31,6 +32,7 @@ class Fit:
         residual: (G, R) weighted.
         columns: (G, R, P) derivatives per scale at (or near) the fitted values.
         information: (P, P) of the data, in units of the scales.
+        settled: whether no step promises a gain any more, by derivatives that hold where it is.
     """
 
     model: Model
@@ -40,6 +42,7 @@ class Fit:
     residual: Array = field(repr=False)
     columns: Array = field(repr=False)
     information: Array = field(repr=False)
+    settled: bool = False
 
 
 def fit(
@@ -49,6 +52,7 @@ def fit(
     iterations: int = 4,
     frozen: Fit | None = None,
     converged: float = CONVERGED,
+    step: float = STEP,
 ) -> Fit:
     """Fit the unknowns of a model.
 
@@ -59,24 +63,27 @@ def fit(
         iterations: most steps that are taken; 0 linearises the problem at the model.
         frozen: a fit whose columns are kept as they are, which spares simulating them; they change little.
         converged: relative gain of a step, made or promised, below which the fit ends.
+        step: of the finite differences, in units of an unknown's scale; finer ones are taken where these lead nowhere.
     """
     everything = (*(frozen.unknowns if frozen else ()), *unknowns)
-    step = STEP
     best = _linearised(problem, model, unknowns, everything, frozen, step)
     damping = DAMPING
     for iteration in range(iterations):
         weight = noise_inflation(problem, best.cost)
-        reached, gain = best.cost + weight * best.prior_penalty, 0.0
+        reached, gain, trusted = best.cost + weight * best.prior_penalty, 0.0, True
         for _ in range(SHORTER):
             stepped, promised = _stepped(problem, best, weight, damping)
             if promised < converged * reached:
                 break
             tried = _evaluated(problem, best, stepped)
             left = tried.cost + weight * tried.prior_penalty
+            trusted = trusted and reached - left > KEPT * promised
             if left < reached:
                 best, gain = tried, (reached - left) / max(reached, 1e-9)
                 break
             damping *= 10.0
+        if trusted and _promises_little(problem, best, converged):
+            return replace(best, settled=True)
         shortened, damping = damping >= POOR, 0.3 * damping
         if gain < converged:
             if not shortened or step == problem.finest or not unknowns:
@@ -85,6 +92,13 @@ def fit(
         if unknowns and iteration < iterations - 1:
             best = _linearised(problem, best.model, unknowns, everything, frozen, step)
     return best
+
+
+def _promises_little(problem: Problem, fitted: Fit, converged: float) -> bool:
+    """Return whether the undamped step from a fit promises a smaller part of its cost than `converged`."""
+    weight = noise_inflation(problem, fitted.cost)
+    promised = _stepped(problem, fitted, weight, DAMPING)[1]
+    return promised < converged * (fitted.cost + weight * fitted.prior_penalty)
 
 
 def _linearised(

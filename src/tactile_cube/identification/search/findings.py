@@ -36,6 +36,7 @@ from tactile_cube.identification.search.proposals import (
     noted,
     of_a_kind,
     off,
+    refit,
     refitted,
     whole,
     without,
@@ -147,7 +148,7 @@ def proposed(search: Search, standard: Proposal | None) -> tuple[list[Proposal],
         search.say(f"{len(looks.scores)} starts of {looks.laws} laws beside {parent.label}")
         tried = [one for one in grown(search, looks) if laws_of(one, usual) <= MOST]
         if standard and looks is first and not whole(search, tried) and not search.spent:
-            usually = noted(search, Proposal(standard.effects, search.refitted(standard.fit.model)))
+            usually = noted(search, refit(search, standard.effects, standard.fit.model))
             tried = sorted([*tried, usually], key=lambda one: one.price(search.criteria))
         if tried and len(tried[0].effects) > len(parent.effects) + 1 and (richer := detailed(search, tried[0])):
             tried = sorted([*tried, richer], key=lambda one: one.price(search.criteria))

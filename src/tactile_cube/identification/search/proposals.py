@@ -9,7 +9,8 @@ import numpy as np
 from tactile_cube.drivetrain.effects.effect import Array, Stage
 from tactile_cube.identification.criteria import Criteria
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit, noise_inflation, precision
-from tactile_cube.identification.fitting.problem import Problem
+from tactile_cube.identification.fitting.problem import STEP, Problem
+from tactile_cube.identification.fitting.unknowns import put_all, read_all
 from tactile_cube.identification.search.candidates import (
     Candidate,
     Score,
@@ -23,6 +24,7 @@ from tactile_cube.identification.search.evidence import joint_errors, joint_squa
 from tactile_cube.identification.search.explanation import Proposal, at_bound, named_by, priced
 from tactile_cube.identification.search.residual_starts import residual_candidates
 from tactile_cube.identification.search.search import Search, failing
+from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.replay.windows import Windows
 
 LOOKED_AT = 4  # part of the segments to judge by, on which every law gets its own steps
@@ -182,12 +184,25 @@ def further(looks: Looks, candidate: Candidate, fitted: Fit) -> tuple[Candidate,
 
 
 def refitted(search: Search, looks: Looks, laws: Tried) -> Proposal:
-    """Refit the parent with some more laws, each started from its own fit."""
-    known = len(looks.frozen.model.terms)
-    terms = [term for _, fitted in laws for term in fitted.model.terms[known:]]
-    model = replace(looks.frozen.model, terms=(*looks.frozen.model.terms, *terms))
-    one = Proposal((*looks.parent.effects, *(candidate for candidate, _ in laws)), search.refitted(model))
-    return noted(search, one)
+    """Refit the parent with some more laws, each started from its own fit; their moves of the constants are added."""
+    parent, unknowns = looks.frozen.model, looks.frozen.unknowns
+    terms = [term for _, fitted in laws for term in fitted.model.terms[len(parent.terms) :]]
+    values = read_all(parent, unknowns)
+    moved = values + sum(read_all(fitted.model, unknowns) - values for _, fitted in laws)
+    model = put_all(replace(parent, terms=(*parent.terms, *terms)), unknowns, moved)
+    return noted(search, refit(search, (*looks.parent.effects, *(candidate for candidate, _ in laws)), model))
+
+
+def refit(search: Search, effects: Sequence[Candidate], model: Model, step: float = STEP) -> Proposal:
+    """Refit a set of effects from a model."""
+    one = Proposal(tuple(effects), search.refitted(model, step))
+    search.fits[in_forms(effects)] = one
+    return one
+
+
+def in_forms(effects: Sequence[Candidate]) -> frozenset[tuple[str, tuple[str, ...], tuple[str, ...]]]:
+    """Return the keys of a set's laws, whatever their order."""
+    return frozenset(map(key, effects))
 
 
 def noted(search: Search, one: Proposal) -> Proposal:
@@ -201,11 +216,18 @@ def noted(search: Search, one: Proposal) -> Proposal:
 
 
 def detailed(search: Search, one: Proposal) -> Proposal | None:
-    """Refit a set with the details of its last law free; None if it has none."""
+    """Refit a set with the details of its last law free; None if it has none.
+
+    If it then fits worse, the derivatives were too coarse: fine ones are taken from the same start.
+    """
     if not (richer := with_details(one.effects[-1], one.fit.model)):
         return None
     candidate, model, _ = richer
-    return noted(search, Proposal((*one.effects[:-1], candidate), search.refitted(model)))
+    effects = (*one.effects[:-1], candidate)
+    found = refit(search, effects, model)
+    if found.fit.cost > one.fit.cost:
+        found = refit(search, effects, model, search.problem.finest)
+    return noted(search, found)
 
 
 def sets(looks: Looks, criteria: Criteria) -> list[Tried]:
@@ -283,8 +305,8 @@ def press(gradient: Array, gram: Array, expected: float) -> float:
 
 
 def without(search: Search, one: Proposal, *places: int) -> Proposal:
-    """Refit a set without some of its effects."""
+    """Refit a set without some of its effects; return what is known of it if it was refitted before."""
     model, effects = one.fit.model, one.effects
     for place in sorted(places, reverse=True):
         model, effects = without_effect(model, effects, place), (*effects[:place], *effects[place + 1 :])
-    return Proposal(effects, search.refitted(model))
+    return search.fits.get(in_forms(effects)) or refit(search, effects, model)

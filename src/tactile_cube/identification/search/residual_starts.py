@@ -63,11 +63,12 @@ def _starts(
 def peaks(
     missing: Missing, response: tuple[float, float] | None = None, size: float = 1.0
 ) -> list[tuple[float, float, float]]:
-    """Return strongest harmonics of a wave over the position: (harmonic, sine part, cosine part), strongest first.
+    """Return harmonics of a wave over the position, (harmonic, sine part, cosine part): peaks, then long waves.
 
     The wave is a torque, or with a `response` (damping [N m s/rad], inertia [kg m^2]) an error e of the position
     sensor, which misses damping * e' + inertia * e''. Each robot initialisation brings joint offsets that are not known
-    well, so phases are compared within one only (Lomb-Scargle). Harmonics go up to `size` times a finger's.
+    well, so phases are compared within one only (Lomb-Scargle). Harmonics go up to `size` times a finger's. A wave of
+    which the range of motion holds no more than one is no peak: half a wave and a whole one are always returned.
     """
     every = max(1, len(missing.torque) // MOST_SAMPLES)
     q, v, a = (
@@ -77,7 +78,8 @@ def peaks(
     t, group = missing.torque[::every], missing.initialisation[::every]
     slow = np.vander((q - q.mean()) / max(np.ptp(q), 1e-9 / size), 4)
     t = t - slow @ np.linalg.lstsq(slow, t, rcond=None)[0]
-    grid = np.arange(LOWEST * size, HIGHEST * size, RESOLUTION / max(np.ptp(q), NARROWEST / size))
+    moved = max(float(np.ptp(q)), NARROWEST / size)
+    grid = np.arange(LOWEST * size, HIGHEST * size, RESOLUTION / moved)
     parts = [group == k for k in np.unique(group)]
 
     def waves(n: float) -> Array:
@@ -98,10 +100,10 @@ def peaks(
     inner = np.flatnonzero((power[1:-1] >= power[:-2]) & (power[1:-1] >= power[2:])) + 1
     strongest = inner[np.argsort(-power[inner])][:PEAKS]
     found = []
-    for k in strongest:
-        columns = np.column_stack([waves(float(grid[k])), slow])
+    for harmonic in (*map(float, grid[strongest]), np.pi / moved, 2.0 * np.pi / moved):
+        columns = np.column_stack([waves(harmonic), slow])
         sine, cosine = np.linalg.lstsq(columns, t, rcond=None)[0][:2]
-        found.append((float(grid[k]), float(sine), float(cosine)))
+        found.append((harmonic, float(sine), float(cosine)))
     return found
 
 

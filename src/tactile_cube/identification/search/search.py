@@ -12,7 +12,7 @@ from tactile_cube.drivetrain.effects.effect import Array, Effect
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit
-from tactile_cube.identification.fitting.problem import Problem, Shooting
+from tactile_cube.identification.fitting.problem import STEP, Problem, Shooting
 from tactile_cube.identification.fitting.unknowns import Unknown, base_unknowns, every_effect
 from tactile_cube.identification.search.candidates import Candidate, candidates, model_unknowns
 from tactile_cube.identification.search.evidence import HeldOut, Judgement, gain, judge, p_value
@@ -61,6 +61,7 @@ class Search:
         free_runs: of the same trials, whole.
         offsets: joint offsets of all initialisations that are known by now [rad].
         candidates: what may be missing, but for what starts from a residual.
+        fits: the sets that were refitted, by their laws, joints and forms.
     """
 
     def __init__(
@@ -102,6 +103,7 @@ class Search:
         self.offsets = dict(self.start_held_out.offsets)
         self.free_runs = HeldOut(self.shooting, held_out, noise, self.offsets)
         self.candidates = candidates(self.shooting.sizes, self.effects)
+        self.fits: dict[frozenset[tuple[str, tuple[str, ...], tuple[str, ...]]], Proposal] = {}
         self.least = math.inf  # error of the best set so far on fitted trials [sensor noise]
 
     @cached_property
@@ -146,14 +148,17 @@ class Search:
         self.problem.linearise_starts(fitted.model)
         return fit(self.problem, fitted.model, fitted.unknowns, iterations=0)
 
-    def refitted(self, model: Model) -> Fit:
+    def refitted(self, model: Model, step: float = STEP) -> Fit:
         """Refit a model completely, linearising initial states anew as long as that helps."""
         self.problem.linearise_starts(model)
-        fitted = fit(self.problem, model, self.unknowns(model), LONG)
+        fitted = fit(self.problem, model, self.unknowns(model), LONG, step=step)
         for _ in range(RENEWED):
             before = fitted
             self.problem.linearise_starts(before.model)
-            fitted = fit(self.problem, before.model, before.unknowns, LONG)
+            same = fit(self.problem, before.model, (), 0, before)
+            if before.settled and abs(same.cost - before.cost) < (1.0 - HELPS) * before.cost:
+                return same
+            fitted = fit(self.problem, before.model, before.unknowns, LONG, step=step)
             if fitted.cost > HELPS * before.cost:
                 break
         return fitted
