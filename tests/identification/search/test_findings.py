@@ -79,7 +79,7 @@ def test_a_search_that_comes_nowhere_near_the_whole_looks_no_further(tmp_path: P
     ("hidden", "values", "beside"),
     [
         # coarse differences point the wrong way from the usual exponent of 2, and a drag took a part of the rest
-        ("stribeck_friction", {"excess": 0.15, "velocity": 0.1, "exponent": 0.5}, "nonlinear_drag"),
+        ("stribeck_friction", {"excess": 0.15, "velocity": 0.08, "exponent": 0.5}, "nonlinear_drag"),
         ("joint_stop", {"upper": 0.6, "stiffness": 3.0, "exponent": 2.0, "depth": 0.1}, "position_torque"),
     ],
 )
@@ -89,7 +89,7 @@ def test_a_law_whose_details_are_not_the_usual_ones_is_named_alone(tmp_path: Pat
     verdict = decide(find(Search(*held_out_split(recording), np.full(1, NOISE), effects, lambda line: None)))
     assert verdict.kind == "missing_effect"
     assert named_by(verdict.chosen.effects) == {(hidden, recording.joints[0])}
-    assert verdict.chosen.error < 1.2
+    assert verdict.chosen.error < 1.1
 
 
 def test_laws_are_tried_where_a_set_fails_most(heavier: Recording) -> None:

@@ -10,7 +10,7 @@ from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.identification.fitting.unknowns import read_all
 from tactile_cube.identification.search.explanation import Proposal, named_by
 from tactile_cube.identification.search.findings import find
-from tactile_cube.identification.search.proposals import grown, look, near, refitted, stepped, whole, without
+from tactile_cube.identification.search.proposals import SHARES, grown, look, near, refitted, stepped, whole, without
 from tactile_cube.identification.search.search import Search
 from tactile_cube.identification.verdict import decide
 from tactile_cube.measurement.split import held_out_split
@@ -61,7 +61,8 @@ def test_a_refit_begins_where_the_laws_own_steps_led_and_adds_what_they_move_of_
     search = searched(tmp_path, {"error": -0.1}, ("torque_gain", "payload"))
     looks = look(search, Proposal((), search.base.fit), ["a"])
     begun = []
-    monkeypatch.setattr(search, "refitted", lambda model, step: begun.append(model) or search.base.fit)
+    monkeypatch.setattr(search, "refitted", lambda model: begun.append(model) or search.base.fit)
+    monkeypatch.setattr(search, "cost", lambda model: 0.0)
     laws = [next(law for law in looks.tried if law[0].effect.name == name) for name in ("torque_gain", "payload")]
     refitted(search, looks, (laws[0],))
     refitted(search, looks, tuple(laws))
@@ -73,6 +74,23 @@ def test_a_refit_begins_where_the_laws_own_steps_led_and_adds_what_they_move_of_
     low, high = (np.array([getattr(one, end) for one in constants]) for end in ("low", "high"))
     assert both == pytest.approx(np.clip(own[0] + own[1] - before, low, high))
     assert [term.effect.name for term in begun[1].terms] == ["torque_gain", "payload"]
+    monkeypatch.setattr(search, "cost", lambda model: np.inf)
+    refitted(search, looks, (laws[0],))
+    assert read_all(begun[2], constants) == pytest.approx(before + SHARES[-1] * (own[0] - before))
+    assert begun[2].terms[0].values["error"] == SHARES[-1] * begun[0].terms[0].values["error"]
+
+
+def test_no_refit_fits_worse_than_what_it_began_with(tmp_path: Path) -> None:
+    search = searched(tmp_path, {"error": -0.1}, ("torque_gain", "payload"))
+    looks = look(search, Proposal((), search.base.fit), ["a"])
+    gain = next(fitted for law, fitted in looks.tried if law.effect.name == "torque_gain").model
+    for model in (
+        search.base.fit.model,
+        gain,
+        replace(gain, constants={**gain.constants, "kd": 3.0 * gain.constants["kd"]}),
+    ):
+        begun = search.cost(model)
+        assert search.cost(search.refitted(model).model) <= begun * (1.0 + 1e-9)
 
 
 def test_a_set_that_was_refitted_before_is_not_simulated_again(tmp_path: Path) -> None:

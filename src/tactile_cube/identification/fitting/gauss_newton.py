@@ -52,7 +52,6 @@ def fit(
     iterations: int = 4,
     frozen: Fit | None = None,
     converged: float = CONVERGED,
-    step: float = STEP,
 ) -> Fit:
     """Fit the unknowns of a model.
 
@@ -63,9 +62,9 @@ def fit(
         iterations: most steps that are taken; 0 linearises the problem at the model.
         frozen: a fit whose columns are kept as they are, which spares simulating them; they change little.
         converged: relative gain of a step, made or promised, below which the fit ends.
-        step: of the finite differences, in units of an unknown's scale; finer ones are taken where these lead nowhere.
     """
     everything = (*(frozen.unknowns if frozen else ()), *unknowns)
+    step = STEP
     best = _linearised(problem, model, unknowns, everything, frozen, step)
     damping = DAMPING
     for iteration in range(iterations):

@@ -9,7 +9,7 @@ import numpy as np
 from tactile_cube.drivetrain.effects.effect import Array, Stage
 from tactile_cube.identification.criteria import Criteria
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit, noise_inflation, precision
-from tactile_cube.identification.fitting.problem import STEP, Problem
+from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.unknowns import put_all, read_all
 from tactile_cube.identification.search.candidates import (
     Candidate,
@@ -24,7 +24,7 @@ from tactile_cube.identification.search.evidence import joint_errors, joint_squa
 from tactile_cube.identification.search.explanation import Proposal, at_bound, named_by, priced
 from tactile_cube.identification.search.residual_starts import residual_candidates
 from tactile_cube.identification.search.search import Search, failing
-from tactile_cube.measurement.replay.model import Model
+from tactile_cube.measurement.replay.model import Model, Term
 from tactile_cube.measurement.replay.windows import Windows
 
 LOOKED_AT = 4  # part of the segments to judge by, on which every law gets its own steps
@@ -34,6 +34,7 @@ MORE_STEPS = 6  # for a law that is asked for, or that may be an alternative to 
 LARGER = 2.0  # most that a law is scaled up within a set; its linearisation holds near its own fit
 SINGLES = 4  # laws that are refitted exactly
 LEAVE_LEAST, CHEAPEST = 3, 2  # pairs that are refitted: with the smallest predicted error, with the lowest price
+SHARES = (1.0, 0.25, 0.06)  # of the way to where laws' own steps led, at which a set may begin
 CLOSE = 2.5  # ratio of squared errors up to which a full refit may make another law as good as the best
 
 
@@ -184,18 +185,31 @@ def further(looks: Looks, candidate: Candidate, fitted: Fit) -> tuple[Candidate,
 
 
 def refitted(search: Search, looks: Looks, laws: Tried) -> Proposal:
-    """Refit the parent with some more laws, each started from its own fit; their moves of the constants are added."""
+    """Refit the parent with some more laws, begun where their own steps led; what they move of the constants is added.
+
+    Where the set fits worse there than the parent, it begins a smaller part of the way from it.
+    """
     parent, unknowns = looks.frozen.model, looks.frozen.unknowns
     terms = [term for _, fitted in laws for term in fitted.model.terms[len(parent.terms) :]]
     values = read_all(parent, unknowns)
-    moved = values + sum(read_all(fitted.model, unknowns) - values for _, fitted in laws)
-    model = put_all(replace(parent, terms=(*parent.terms, *terms)), unknowns, moved)
+    moved = sum(read_all(fitted.model, unknowns) - values for _, fitted in laws)
+    for share in SHARES:
+        added = replace(parent, terms=(*parent.terms, *(smaller(term, share) for term in terms)))
+        model = put_all(added, unknowns, values + share * moved)
+        if search.cost(model) < looks.parent.fit.cost:
+            break
     return noted(search, refit(search, (*looks.parent.effects, *(candidate for candidate, _ in laws)), model))
 
 
-def refit(search: Search, effects: Sequence[Candidate], model: Model, step: float = STEP) -> Proposal:
+def smaller(term: Term, share: float) -> Term:
+    """Return a term with a share of the parameters that set its size, those that are neutral at zero."""
+    sizes = {p.name for p in term.effect.parameters if p.neutral == 0.0}.intersection(term.fitted)
+    return replace(term, values={name: v * share if name in sizes else v for name, v in term.values.items()})
+
+
+def refit(search: Search, effects: Sequence[Candidate], model: Model) -> Proposal:
     """Refit a set of effects from a model."""
-    one = Proposal(tuple(effects), search.refitted(model, step))
+    one = Proposal(tuple(effects), search.refitted(model))
     search.fits[in_forms(effects)] = one
     return one
 
@@ -216,18 +230,11 @@ def noted(search: Search, one: Proposal) -> Proposal:
 
 
 def detailed(search: Search, one: Proposal) -> Proposal | None:
-    """Refit a set with the details of its last law free; None if it has none.
-
-    If it then fits worse, the derivatives were too coarse: fine ones are taken from the same start.
-    """
+    """Refit a set with the details of its last law free; None if it has none."""
     if not (richer := with_details(one.effects[-1], one.fit.model)):
         return None
     candidate, model, _ = richer
-    effects = (*one.effects[:-1], candidate)
-    found = refit(search, effects, model)
-    if found.fit.cost > one.fit.cost:
-        found = refit(search, effects, model, search.problem.finest)
-    return noted(search, found)
+    return noted(search, refit(search, (*one.effects[:-1], candidate), model))
 
 
 def sets(looks: Looks, criteria: Criteria) -> list[Tried]:

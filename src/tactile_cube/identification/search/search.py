@@ -12,7 +12,7 @@ from tactile_cube.drivetrain.effects.effect import Array, Effect
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit
-from tactile_cube.identification.fitting.problem import STEP, Problem, Shooting
+from tactile_cube.identification.fitting.problem import Problem, Shooting
 from tactile_cube.identification.fitting.unknowns import Unknown, base_unknowns, every_effect
 from tactile_cube.identification.search.candidates import Candidate, candidates, model_unknowns
 from tactile_cube.identification.search.evidence import HeldOut, Judgement, gain, judge, p_value
@@ -148,20 +148,29 @@ class Search:
         self.problem.linearise_starts(fitted.model)
         return fit(self.problem, fitted.model, fitted.unknowns, iterations=0)
 
-    def refitted(self, model: Model, step: float = STEP) -> Fit:
-        """Refit a model completely, linearising initial states anew as long as that helps."""
+    def cost(self, model: Model) -> float:
+        """Return the squared error of a model on the fitted windows, linearising initial states anew."""
         self.problem.linearise_starts(model)
-        fitted = fit(self.problem, model, self.unknowns(model), LONG, step=step)
-        for _ in range(RENEWED):
-            before = fitted
-            self.problem.linearise_starts(before.model)
-            same = fit(self.problem, before.model, (), 0, before)
-            if before.settled and abs(same.cost - before.cost) < (1.0 - HELPS) * before.cost:
-                return same
-            fitted = fit(self.problem, before.model, before.unknowns, LONG, step=step)
-            if fitted.cost > HELPS * before.cost:
+        return float(self.problem.cost(self.problem.residual(self.problem.prediction(model))).sum())
+
+    def refitted(self, model: Model) -> Fit:
+        """Refit a model completely, linearising initial states anew as long as that helps; it fits no worse after."""
+        unknowns, begun = self.unknowns(model), self.cost(model)
+        best: Fit | None = None
+        last = model
+        for _ in range(1 + RENEWED):
+            reached = fit(self.problem, last, unknowns, LONG)
+            last, before = reached.model, best
+            self.problem.linearise_starts(last)
+            one = fit(self.problem, last, (), 0, reached)
+            best = min([known for known in (before, one) if known], key=lambda known: known.cost)
+            unchanged = reached.settled and abs(one.cost - reached.cost) < (1.0 - HELPS) * reached.cost
+            if unchanged or (before and one.cost > HELPS * before.cost):
                 break
-        return fitted
+        if best and best.cost <= begun:
+            return best
+        self.problem.linearise_starts(model)
+        return fit(self.problem, model, unknowns, iterations=0)
 
     def over_noise(self, fitted: Fit) -> float:
         """Return the RMS error of a fit in units of the sensor noise."""
