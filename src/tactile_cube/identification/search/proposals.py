@@ -220,10 +220,10 @@ def in_forms(effects: Sequence[Candidate]) -> frozenset[tuple[str, tuple[str, ..
 
 
 def noted(search: Search, one: Proposal) -> Proposal:
-    """Report a set, and note it if it is the best so far."""
-    left = search.over_noise(one.fit)
-    if left < search.least:
-        search.least = left
+    """Report a set, and note it if it is the best so far, its parameters counted."""
+    left, price = search.over_noise(one.fit), one.price(search.criteria)
+    if price < search.least:
+        search.least = price
         search.stand(f"{one.label} ({left:.2f} x sensor noise on fitted trials)", "other laws and pairs of them")
     search.say(f"  {left:8.3f}  {one.label}")
     return one

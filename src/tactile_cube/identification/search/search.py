@@ -104,7 +104,7 @@ class Search:
         self.free_runs = HeldOut(self.shooting, held_out, noise, self.offsets)
         self.candidates = candidates(self.shooting.sizes, self.effects)
         self.fits: dict[frozenset[tuple[str, tuple[str, ...], tuple[str, ...]]], Proposal] = {}
-        self.least = math.inf  # error of the best set so far on fitted trials [sensor noise]
+        self.least = math.inf  # price of the best set so far on fitted trials
 
     @cached_property
     def base(self) -> Explanation:
