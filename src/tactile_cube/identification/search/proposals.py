@@ -208,10 +208,10 @@ def smaller(term: Term, share: float) -> Term:
 
 
 def refit(search: Search, effects: Sequence[Candidate], model: Model) -> Proposal:
-    """Refit a set of effects from a model."""
-    one = Proposal(tuple(effects), search.refitted(model))
-    search.fits[in_forms(effects)] = one
-    return one
+    """Refit a set of effects from a model; return the best fit that is known of it."""
+    one, laws = Proposal(tuple(effects), search.refitted(model)), in_forms(effects)
+    search.fits[laws] = min(one, search.fits.get(laws, one), key=lambda known: known.fit.cost)
+    return search.fits[laws]
 
 
 def in_forms(effects: Sequence[Candidate]) -> frozenset[tuple[str, tuple[str, ...], tuple[str, ...]]]:

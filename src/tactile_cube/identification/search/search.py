@@ -61,7 +61,7 @@ class Search:
         free_runs: of the same trials, whole.
         offsets: joint offsets of all initialisations that are known by now [rad].
         candidates: what may be missing, but for what starts from a residual.
-        fits: the sets that were refitted, by their laws, joints and forms.
+        fits: the best fit of each set that was refitted, by its laws, joints and forms.
     """
 
     def __init__(
@@ -156,18 +156,17 @@ class Search:
     def refitted(self, model: Model) -> Fit:
         """Refit a model completely, linearising initial states anew as long as that helps; it fits no worse after."""
         unknowns, begun = self.unknowns(model), self.cost(model)
-        best: Fit | None = None
-        last = model
+        found: list[Fit] = []
         for _ in range(1 + RENEWED):
-            reached = fit(self.problem, last, unknowns, LONG)
-            last, before = reached.model, best
-            self.problem.linearise_starts(last)
-            one = fit(self.problem, last, (), 0, reached)
-            best = min([known for known in (before, one) if known], key=lambda known: known.cost)
-            unchanged = reached.settled and abs(one.cost - reached.cost) < (1.0 - HELPS) * reached.cost
-            if unchanged or (before and one.cost > HELPS * before.cost):
+            reached = fit(self.problem, found[-1].model if found else model, unknowns, LONG)
+            self.problem.linearise_starts(reached.model)
+            found.append(fit(self.problem, reached.model, (), 0, reached))
+            if reached.settled and abs(found[-1].cost - reached.cost) < (1.0 - HELPS) * reached.cost:
                 break
-        if best and best.cost <= begun:
+            if len(found) > 1 and found[-1].cost > HELPS * found[-2].cost:
+                break
+        best = min(found, key=lambda one: one.cost)
+        if best.cost <= begun:
             return best
         self.problem.linearise_starts(model)
         return fit(self.problem, model, unknowns, iterations=0)
